@@ -12,7 +12,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints, on_one_blas_thread
 from alphacut.base.errors import RefusedError, require, require_choice
-from alphacut.base.progress_bar import Progress, progress_reporter, subprogress
+from alphacut.base.progress_bar import Progress, progress_reporter, searching, subprogress
 from alphacut.frame.bounds.box_proof import refusing
 from alphacut.frame.boxes import ALPHA, Boxes, UnitFlow, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -130,6 +130,7 @@ def envelope(
     from alphacut.frame.methods.graph_follower import GraphFollower, with_ascents
     from alphacut.frame.methods.improved_follower import ImprovedFollower
     from alphacut.frame.methods.proof import Proof
+    from alphacut.frame.methods.sampled import Sampled
 
     start = perf_counter()
     problem = _build_problem(model, inputs, method, duration, step, alpha, integrator, **options)
@@ -144,10 +145,11 @@ def envelope(
         proof = Proof(gap=chosen.tolerance / 4, boxes=1000)
     proved: Envelope | None = None
     with progress_reporter(progress) as tick:
-        method_progress = tick
+        # Of samples the number is known, of all other methods what they will need is not.
+        method_progress = tick if isinstance(chosen, Sampled) else searching(tick)
         if proof:
-            proved = _proved(flow, proof, subprogress(tick, 0.0, 0.5))
-            method_progress = subprogress(tick, 0.5, 1.0)
+            proved = _proved(flow, proof, searching(subprogress(tick, 0.0, 0.5)))
+            method_progress = searching(subprogress(tick, 0.5, 1.0))
         bounds = chosen.run(flow, method_progress)
         if proved is None and isinstance(chosen, GraphFollower):
             bounds = with_ascents(bounds, flow)

@@ -12,7 +12,7 @@ import numpy as np
 from alphacut import frame
 from alphacut.base.arrays import Array
 from alphacut.base.errors import FailedError, require
-from alphacut.base.progress_bar import Progress, subprogress
+from alphacut.base.progress_bar import Progress, searching, subprogress
 from alphacut.case.motion import EnvelopeSection, Study, Tolerance
 from alphacut.case.structure import Structure
 from alphacut.frame.analyses.peaks import (
@@ -140,10 +140,12 @@ class EnvelopeTask:
         """
         # The peaks that questions limit may take a second analysis, for about the same time.
         end = 1.0
+        tick = context.tick
         if self.limited:
             end = 0.5
-        result = self._envelope(structure, subprogress(context.tick, 0.0, end))
-        peak_bounds = self._peaks(structure, result, subprogress(context.tick, end, 1.0))
+            tick = searching(tick)
+        result = self._envelope(structure, subprogress(tick, 0.0, end))
+        peak_bounds = self._peaks(structure, result, subprogress(tick, end, 1.0))
         # α-cuts are nested: the lowest level contains all others, so that its extremes and its
         # largest error are those of the whole envelope.
         data = result.to_dataset().sel(output=list(map(str, structure.outputs)))
@@ -177,7 +179,7 @@ class EnvelopeTask:
 
         Args:
             structure: The structure with its fuzzy parameters.
-            progress: Called with the completed fraction of the envelope of a box.
+            progress: Called with the completed fraction.
         """
         arguments = self.arguments(structure)
         learned = structure.learned
@@ -192,6 +194,7 @@ class EnvelopeTask:
                 self.section.method,
                 duration=self.duration,
                 step=self.section.step,
+                progress=progress,
             )
         is_relative = not self.tolerance(structure).unit
         return frame.envelope(**arguments, relative=is_relative, progress=progress)

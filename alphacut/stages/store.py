@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 from alphacut.base.arrays import on_one_blas_thread
 from alphacut.base.errors import FailedError, RefusedError, require
 from alphacut.base.kept_files import whole_file, write_text
-from alphacut.base.progress_bar import Progress, subprogress
+from alphacut.base.progress_bar import Progress, foretelling, subprogress
 from alphacut.io.files import as_json, rank, say
 from alphacut.io.provenance import build_provenance, fingerprint
 from alphacut.io.results import Listed, ResultsFolder, write_arrays
@@ -150,7 +150,7 @@ class RunProgress:
         if seconds:
             self.done += (1 - first) * seconds / max(seconds, self.seconds_left)
         self.seconds_left -= seconds
-        return subprogress(self.show, first, self.done)
+        return foretelling(subprogress(self.show, first, self.done))
 
     def _seconds_of(self, names: Iterable[str]) -> float:
         """Return the rough seconds of stages by the first words of their names, 1 by default."""

@@ -8,6 +8,7 @@ rejection: points of the cover whose modes lie in the measured ranges.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import require
+from alphacut.base.progress_bar import Progress
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.identification.enclosure import enclosure
@@ -116,6 +118,7 @@ def learned_envelope(
     step: float,
     boxes: int = 16,
     count: int = 200,
+    progress: Progress | None = None,
 ) -> Envelope:
     """Return guaranteed bounds of the motions of all structures of a learned set, on each level.
 
@@ -127,6 +130,7 @@ def learned_envelope(
         step: Distance of the time nodes, in s.
         boxes: Boxes of the cover of the set on each level.
         count: Members of the set whose motions are computed for attained values, on each level.
+        progress: Called with the completed fraction.
 
     Returns:
         Bounds that are never wider than those of the box around the set. Attained values and their
@@ -140,10 +144,13 @@ def learned_envelope(
 
     def bounded(inputs: Mapping[str, FuzzyNumber], alpha: Sequence[float]) -> Envelope:
         """Return the envelope over boxes of inputs."""
+        if progress is not None:
+            progress(min(next(done) / (1 + boxes * len(learned.alpha)), 1.0))
         return envelope(
             model, inputs, method, duration=duration, step=step, alpha=alpha, progress=False
         )
 
+    done = itertools.count()
     numbers = learned.inputs
     whole = bounded(numbers, [float(alpha) for alpha in learned.alpha])
     is_guaranteed = whole.nature is Nature.GUARANTEED

@@ -3,9 +3,10 @@
 import time
 
 import numpy as np
+import pytest
 
 from alphacut.base.kernels import kernel
-from alphacut.base.progress_bar import progress_reporter
+from alphacut.base.progress_bar import Foretold, foretelling, progress_reporter, searching
 
 
 def test_what_begins_anew_does_not_run_backwards():
@@ -36,7 +37,7 @@ def test_a_line_says_that_a_kernel_is_compiled(monkeypatch, capsys, tmp_path):
     with progress_reporter(None):
         assert twice(2) == 4
         assert twice(3) == 6
-    assert capsys.readouterr().err == "  0% after 11 s, compiling, once\n"
+    assert capsys.readouterr().err == "  0% after 22 s, compiling, once\n"
 
 
 def _twice(number):
@@ -59,3 +60,46 @@ def test_lines_go_on_while_nothing_is_reported(monkeypatch, capsys):
     assert written == sorted(set(written))
     time.sleep(1.5)
     assert capsys.readouterr().err == ""
+
+
+def foretold(course, monkeypatch):
+    """The times left that are told in a course of (work, fraction), and those that are right."""
+    clock = [0.0]
+    monkeypatch.setattr("alphacut.base.progress_bar.monotonic", lambda: clock[0])
+    found = []
+    report = foretelling(lambda told: found.append((told.seconds_left, course[-1][0] - clock[0])))
+    for work, fraction in course:
+        clock[0] = work
+        report(fraction)
+    return found
+
+
+def test_times_of_stages_of_speeds_within_a_factor_of_three_are_right_within_it(monkeypatch, rng):
+    for _ in range(20):
+        speeds = rng.uniform(1.0, 3.0, 60)
+        fractions = np.cumsum(speeds) / speeds.sum()
+        course = [(1.0 + k, float(x)) for k, x in enumerate(fractions)]
+        for told, right in foretold(course, monkeypatch)[:-1]:
+            assert told is None or right / 3 <= told <= 3 * right
+    even = [(1.0 + k, (1.0 + k) / 60) for k in range(60)]
+    told = [seconds for seconds, _ in foretold(even, monkeypatch)]
+    assert told[:11] == [None] * 11  # up to a fifth of the way
+    assert told[11:] == pytest.approx([48.0 - k for k in range(49)], abs=1e-9)
+
+
+@pytest.mark.parametrize("power", [0.3, 3.0])
+def test_stages_that_slow_down_or_jump_foretell_nothing(monkeypatch, power):
+    course = [(1.0 + k, ((1.0 + k) / 60) ** power) for k in range(60)]
+    assert {told for told, _ in foretold(course, monkeypatch)} == {None}
+    jump = [(1.0 + k, 0.0 if k < 50 else 0.5 + (k - 50) / 100) for k in range(60)]
+    assert {told for told, _ in foretold(jump, monkeypatch)} == {None}
+
+
+def test_a_search_foretells_nothing():
+    told = []
+    report = foretelling(told.append)
+    for fraction in (0.1, 0.5, 1.0):
+        searching(report)(fraction)
+    assert told == [0.1, 0.5, 1.0]
+    assert {type(x) for x in told} == {Foretold}
+    assert {x.seconds_left for x in told} == {None}

@@ -7,6 +7,7 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from alphacut import frame
+from alphacut.base.progress_bar import Foretold
 from alphacut.frame import Accelerogram, MatrixStructure, Proof, StoreyFrame, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -209,6 +210,9 @@ def test_progress_rises_to_one(name):
     assert (np.diff(told) >= 0).all()
     assert len(set(told)) > 5
     assert told[-1] == 1.0
+    # The number of samples is known, how many sub-boxes or trajectories are needed is not.
+    is_foretold = not any(isinstance(x, Foretold) and x.seconds_left is None for x in told)
+    assert is_foretold == (name == "quasi-monte-carlo")
 
 
 def test_bounds_that_are_too_narrow_are_left_by_as_much():
