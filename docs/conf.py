@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from sphinx.pycode import ModuleAnalyzer
 
 if TYPE_CHECKING:
-    from pydantic.fields import FieldInfo
     from sphinx.application import Sphinx
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
@@ -64,7 +63,9 @@ mathjax2_config = {
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "imported-members": True}
-autodoc_type_aliases = {name: name for name in ("Array", "Ints", "Mask")}  # not ndarray[tuple[…
+autodoc_type_aliases = {
+    name: name for name in ("Array", "Ints", "Mask", "Values")
+}  # not ndarray[tuple[…
 CONSTANTS = {
     "DISCS": "alphacut.stochastic.particles.shapes",
     "INTEGRATORS": "alphacut.frame.dynamics.integrators",
@@ -95,39 +96,6 @@ def without_modules(
     context["script_files"] = [one for one in scripts if "scripts/furo.js" not in str(one)]
 
 
-def with_keys(
-    _app: Sphinx, _what: str, _name: str, documented: object, _options: object, lines: list[str]
-) -> None:
-    """Adds the keys of a section of a case as a table, from the model's own fields.
-
-    A section that is made from the options of an analysis is documented by their class.
-    """
-    from alphacut.case.analyses import ANALYSES
-    from alphacut.case.generated import section_at
-    from alphacut.case.parse import allowed_values
-    from alphacut.case.types import Section
-
-    fields: dict[str, FieldInfo] = {}
-    for key, analysis in ANALYSES.items():
-        if (
-            analysis.section
-            == f"{getattr(documented, '__module__', '')}:{getattr(documented, '__name__', '')}"
-        ):
-            documented = section_at(key, analysis.section)
-            lines[:] = lines[:1]
-    if isinstance(documented, type) and issubclass(documented, Section):
-        fields = documented.described_fields()
-    rows = [
-        (f"``{key}``", described(field), allowed_values(field), default(field))
-        for key, field in fields.items()
-    ]
-    if rows:
-        lines += ["", ".. list-table::", "   :header-rows: 1", "   :widths: 20 40 25 15", ""]
-    for row in [("key", "meaning", "allowed", "default")] * bool(rows) + rows:
-        lines += [f"   {' ' if place else '*'} - {cell}" for place, cell in enumerate(row)]
-    lines += [""]
-
-
 def with_bars(
     _app: Sphinx, _what: str, _name: str, _documented: object, _options: object, lines: list[str]
 ) -> None:
@@ -147,47 +115,9 @@ def with_strings_below(
         lines[:] = analyzer.find_attr_docs()["", constant]
 
 
-def described(field: FieldInfo) -> str:
-    """The description of a key in reStructuredText."""
-    return (field.description or "section of its own").replace("`", "``")
-
-
-def default(field: FieldInfo) -> str:
-    """The default of a key in words."""
-    if field.is_required():
-        return "required"
-    values = field.default if isinstance(field.default, tuple) else (field.default,)
-    if any(value is None or hasattr(value, "model_fields") for value in values):
-        return ""
-    if field.default_factory is not None:
-        return ""
-    return ", ".join(_in_words(value) for value in values if value != {})
-
-
-def _in_words(value: object) -> str:
-    from alphacut.case.loads import Scale
-    from alphacut.case.motion import Tolerance
-    from alphacut.fuzzy import FuzzyNumber
-
-    if isinstance(value, FuzzyNumber):
-        return f"{value.nominal:g}"
-    if isinstance(value, Scale):
-        return f"{value.value:g}"
-    return f"{value.value:g} {value.unit}" if isinstance(value, Tolerance) else str(value)
-
-
-def without_signature(
-    _app: Sphinx, _what: str, _name: str, documented: object, *_: object
-) -> tuple[str, str] | None:
-    """Leaves out the signature of a section, whose keys are listed."""
-    return ("", "") if hasattr(documented, "model_fields") else None
-
-
 def setup(app: Sphinx) -> None:
     """Hooks into the build."""
     app.connect("builder-inited", copy_mathjax)
     app.connect("autodoc-process-docstring", with_bars)
-    app.connect("autodoc-process-docstring", with_keys)
     app.connect("autodoc-process-docstring", with_strings_below, priority=900)
-    app.connect("autodoc-process-signature", without_signature)
     app.connect("html-page-context", without_modules, priority=900)

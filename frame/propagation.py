@@ -110,9 +110,10 @@ def envelope(
         options: Options of a method that is given by its name, or of `Auto`.
 
     Returns:
-        Bounds at the time nodes with their guarantee, their error, deviations between the nodes,
-        and the inputs that attain them. Attained values and inputs are missing if the cuts of the
-        inputs are a box around a learned set.
+        Envelope: `lower` and `upper` at the nodes `time` in SI, shape (levels, times, outputs),
+        their `nature` (guaranteed, estimated or attained) and `error`, the deviations `between` the
+        nodes, and the inputs `lower_at` and `upper_at` that attain them. Attained values and inputs
+        are missing if the cuts of the inputs are a box around a learned set.
 
     Raises:
         RefusedError: A name or an option is unknown, a value is out of range, a support contains

@@ -81,8 +81,9 @@ def propagate(
             none.
 
     Returns:
-        Lower and upper ends of every output on every level, where they are reached, and their
-        nature: attained, estimated or guaranteed.
+        Bounds: `lower` and `upper` of every output on every level of `alpha`, shape (levels, …),
+        the inputs `lower_at` and `upper_at` where they are reached, their `nature` (attained,
+        estimated or guaranteed), `evaluations`, and `plot`, `number` and `to_dataset`.
 
     Raises:
         RefusedError: An argument is wrong, or the budget does not carry the method.

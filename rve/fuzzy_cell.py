@@ -298,10 +298,25 @@ def fuzzy_stiffness(
             whatever is given.
         campaign: Further arguments of `propagate`: workers, executor, store, identity, progress.
 
+    Returns:
+        FuzzyStiffness: E as the fuzzy number `modulus`, the α-cuts of all `constants` in `cuts`,
+        their `guarantee` and declared `error`, and `bounds`, the samples of the campaign.
+
     Raises:
         RefusedError: An input is no parameter, or a value is not allowed.
         CampaignError: Samples failed; the others are in the store.
         FailedError: A coarser model contradicts guaranteed bounds.
+
+    Example:
+        >>> from alphacut.fuzzy import Triangular
+        >>> from alphacut.rve import Phase, SeriesModel
+        >>> from alphacut.stochastic import HermiteMap
+        >>> phases = [Phase(20e9), Phase(80e9)]
+        >>> inputs = {"inclusion_modulus": Triangular(75e9, 80e9, 85e9)}
+        >>> radius = HermiteMap(0.2, 0.1, 0.6, 0.1)
+        >>> found = fuzzy_stiffness(SeriesModel(), radius, phases, inputs, progress=False)
+        >>> [f"{end / 1e9:.2f} GPa" for end in found.modulus.cut(0)]
+        ['22.69 GPa', '22.85 GPa']
     """
     # Plans of samples take time to import, and an image has none.
     from alphacut.fuzzy import General, propagate

@@ -364,6 +364,10 @@ def fit_radius_map(
         workers: Processes that tessellate; the result does not depend on their number.
         progress: Function that takes the completed fraction.
 
+    Returns:
+        FittedRadiusMap: the `map` at the fitted slopes, its fuzzy slopes as `inputs` by name, and
+        the `sample` and `pbox` that they rest on.
+
     Raises:
         RefusedError: Limits do not rise within (0, 1), cells are too tight or all alike, or there
             are too few.

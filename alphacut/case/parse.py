@@ -388,13 +388,19 @@ def _walk_keys(
         if sections is not None and key not in sections:
             continue
         name = f"{prefix}{key}"
-        # the annotation itself and all types inside it, as in tuple[ForceSection, ...]
-        parts = [info.annotation, *info.metadata, *_annotation_parts(info.annotation)]
-        parts = [x.load() if isinstance(x, FirstUse) and x.load else x for x in parts]
-        models = [part for part in parts if isinstance(part, type) and issubclass(part, Section)]
+        models = sections_in(info)
         yield name, info, bool(models)
         for inner in models:
             yield from _walk_keys(f"{name}.", inner, described=described)
+
+
+def sections_in(info: FieldInfo) -> list[type[Section]]:
+    """Return the classes of the sections that a key takes; empty for a key with a value."""
+    # the annotation itself and all types inside it, as in tuple[ForceSection, ...]
+    parts = [info.annotation, *info.metadata, *_annotation_parts(info.annotation)]
+    parts = [x.load() if isinstance(x, FirstUse) and x.load else x for x in parts]
+    found = [part for part in parts if isinstance(part, type) and issubclass(part, Section)]
+    return list(dict.fromkeys(found))
 
 
 def _has_free_names(info: FieldInfo) -> bool:

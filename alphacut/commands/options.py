@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 PETSC_PREFIX = "-rve_"
 OPTIONS_FILE = "-options_file"
-PETSC_HELP = f"""\
-options of PETSc, for prisms (method prism, or a mesh): {PETSC_PREFIX}… anywhere, as
-{PETSC_PREFIX}ksp_type gmres {PETSC_PREFIX}pc_type gamg, or {OPTIONS_FILE} FILE with such words"""
+PETSC_HELP = """\
+options of PETSc, for prisms (method prism, or a mesh): -rve_… anywhere, as
+-rve_ksp_type gmres -rve_pc_type gamg, or -options_file FILE with such words"""
 
 
 @dataclass(frozen=True)

@@ -62,6 +62,13 @@ def add_folder(parser: argparse.ArgumentParser) -> None:
     add_quiet(parser)
 
 
+def add_section(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``keys``."""
+    about = "one section, as cell or records.spectrum (default: all)"
+    parser.add_argument("section", metavar="SECTION", nargs="?", default="", help=about)
+    add_quiet(parser)
+
+
 COMMANDS = {
     "run": Command("run every stage of a case: files, figures, summary", add_options, "run:run"),
     "check": Command(
@@ -84,6 +91,9 @@ COMMANDS = {
         "inputs of a frame from its measured natural modes", add_common, "run:identify"
     ),
     "report": Command("one self-contained HTML page of a run's results", add_page, "run:report"),
+    "keys": Command(
+        "keys of case files with their units, ranges and defaults", add_section, "keys:run"
+    ),
     "verify": Command(
         "test the proved envelopes of a run by exact motions, without the proof",
         add_folder,

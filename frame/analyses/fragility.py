@@ -816,10 +816,24 @@ def fragility(
             records.
         progress: Called with the completed fraction.
 
+    Returns:
+        Fragility: the curves of each limit and event by name in `limits`, over the intensity
+        `measure`, and the `states`.
+
     Raises:
         RefusedError: The structure does not start at rest or has forces, a limit does not fit, or
             an argument is out of range.
         FailedError: No bounds are found for a record, or a time step did not converge.
+
+    Example:
+        >>> from alphacut.frame import Accelerogram, Limit, StoreyFrame
+        >>> from alphacut.fuzzy import Interval
+        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], damping_ratio=0.05, outputs=("q1",))
+        >>> suite = [Accelerogram(0.02, np.sin(np.arange(50) / k)) for k in (6, 8)]
+        >>> k1 = {"k1": Interval(38e3, 42e3)}
+        >>> found = fragility(frame, k1, suite, Limit("q1", 0.02), duration=2.0, step=0.05)
+        >>> list(found.limits), found.measure
+        (['q1'], 'Sa(T1)')
     """
     if states:
         require(not limits, "limits", value="beside states", allowed="one of them")

@@ -93,6 +93,19 @@ def sensitivity(
             a group.
         reached_at: By output, inputs at which the peak of the output is known to be large. The
             search begins there, or at the nominal values where nothing is given.
+
+    Returns:
+        Sensitivity, with the fractions of the width in `shares`, by result and input.
+
+    Example:
+        >>> from alphacut.frame import StoreyFrame
+        >>> from alphacut.fuzzy import Interval
+        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], v0=[1.0], outputs=("q1",))
+        >>> inputs = {"k1": Interval(36e3, 44e3), "m1": Interval(990, 1010)}
+        >>> found = sensitivity(frame, inputs, duration=1.0, step=0.02)
+        >>> effects = found.shares["the peak of q1"]
+        >>> effects["k1"] > effects["m1"]
+        True
     """
     outputs = list(map(str, model.outputs))
     flow = make_flow(model, tuple(inputs), duration, step)

@@ -292,9 +292,22 @@ def tolerances(
         at_one: Known peaks at the scale 1; their first level must be that of the supports.
         progress: Called with the completed fraction.
 
+    Returns:
+        Tolerances: `kept`, the largest scale tried at which no limit is exceeded, `passed`, the
+        smallest one at which a response exceeds a limit, and the `nature` of the first.
+
     Raises:
         RefusedError: A limit or a number is out of range, or supports scaled by `most` contain
             inadmissible values.
+
+    Example:
+        >>> from alphacut.frame import Limit, StoreyFrame
+        >>> from alphacut.fuzzy import Interval
+        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1], outputs=("q1",))
+        >>> k1 = Interval(38e3, 42e3)
+        >>> found = tolerances(frame, {"k1": k1}, Limit("q1", 0.15), duration=1.0, step=0.05)
+        >>> found.kept, str(found.nature)
+        (2.0, 'guaranteed')
     """
     checked_number("most", most, positive=True)
     checked_number("precision", precision, positive=True, most=1)

@@ -58,6 +58,10 @@ def identify(
         held_out: Numbers of modes that are predicted instead of learned from.
         alpha: Levels, rising within (0, 1].
 
+    Returns:
+        Identified: the boxes' ends `lower` and `upper` in SI, shape (levels, parameters), `empty`,
+        and the words `refutation` where no parameters agree.
+
     Raises:
         RefusedError: An input is no parameter of the modes; a mode, floor or level is out of range;
             no mode is left to learn from, or a mode has values without scatter.

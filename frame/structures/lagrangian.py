@@ -237,6 +237,10 @@ def pendulum(
 
     Raises:
         RefusedError: An argument is no such number.
+
+    Example:
+        >>> pendulum(length=2.0).outputs
+        ('force', 'phi')
     """
     for name, value in {"mass": mass, "length": length, "gravity": gravity}.items():
         checked_number(name, value, positive=True)

@@ -160,7 +160,15 @@ def require_budget(samples: float, campaign: Campaign, method: str) -> None:
 
 @dataclass(frozen=True)
 class General:
-    """General transformation method: all combinations of the recursion's points."""
+    """General transformation method: all combinations of the recursion's points.
+
+    Example:
+        >>> from alphacut.fuzzy import General, Triangular, propagate
+        >>> x = Triangular(-1, 0, 2)
+        >>> found = propagate(lambda x: x * x, {"x": x}, General(), alpha=[0, 1], progress=False)
+        >>> found.upper.tolist(), str(found.nature)
+        ([[4.0], [0.0]], 'attained')
+    """
 
     name = "general"
     takes_inner_points: ClassVar[bool] = True

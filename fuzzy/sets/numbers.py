@@ -209,7 +209,12 @@ class Crisp(_Corners):
 
 @dataclass(frozen=True)
 class Interval(_Corners):
-    """A crisp interval: membership 1 between its finite ends, 0 outside."""
+    """A crisp interval: membership 1 between its finite ends, 0 outside.
+
+    Example:
+        >>> Interval(3, 5).cut(0.5), Interval(3, 5).nominal
+        (Cut(lower=3.0, upper=5.0), 4.0)
+    """
 
     lower: float
     upper: float

@@ -32,6 +32,10 @@ class Phase:
         modulus: Young's modulus in Pa, positive.
         poisson: Poisson's ratio, inside (−1, 0.5).
         loss: Loss factor tan δ of the whole stiffness, 0 or more; None where it is not asked for.
+
+    Example:
+        >>> (Phase(20e9, 0.25).stiffness / 1e9).tolist()  # Voigt order 11, 22, 12 with 2 ε12
+        [[24.0, 8.0, 0.0], [8.0, 24.0, 0.0], [0.0, 0.0, 8.0]]
     """
 
     modulus: float

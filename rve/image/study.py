@@ -87,6 +87,11 @@ class GreyImage:
     Args:
         values: Shape (y, x) with y pointing up, or (z, y, x).
         lengths: Sides of a pixel or voxel in the order of the axes of `values`, in m.
+
+    Example:
+        >>> image = GreyImage(np.zeros((20, 30)), lengths=(2e-6, 2e-6))
+        >>> image.values.shape
+        (20, 30)
     """
 
     values: Array
@@ -118,6 +123,14 @@ def read_image(
         RefusedError: The file is missing, none of these, damaged, too large for memory, or states
             other sides of a voxel, or sides of other ratios where it states no unit; or a length of
             `spacing` is no positive, finite number, or there are not as many as axes.
+
+    Example:
+        >>> import tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     np.save(f"{folder}/image.npy", np.zeros((20, 30)))
+        ...     image = read_image(f"{folder}/image.npy", spacing=2e-6)
+        >>> image.values.shape, image.lengths
+        ((20, 30), (2e-06, 2e-06))
     """
     file = Path(path)
     # A TIFF file may be a picture or a stack of slices: three sides say that it is a volume.
@@ -676,13 +689,23 @@ def fuzzy_image_stiffness(
             by default.
 
     Returns:
-        Bounds at each level of E, ν and the constants along the axes, what widens them, and the
-        loss factors where phases have some.
+        FuzzyImageStiffness: bounds at each level of `alpha` in `cuts` (E, ν and the constants along
+        the axes by name), E as the fuzzy number `modulus`, what widens them in `widths`, the
+        phases' `fractions`, and the loss factors where phases have some.
 
     Raises:
         RefusedError: A value is not allowed, or the image does not fit into memory.
         FailedError: The bounds do not tell that E is positive, or contradict each other; or the
             solver does not converge.
+
+    Example:
+        >>> from alphacut.fuzzy import Triangular
+        >>> image = GreyImage(np.kron([[0, 1], [0, 0]], np.ones((4, 4))), lengths=(1e-6, 1e-6))
+        >>> phases = [{"modulus": Triangular(19e9, 20e9, 21e9), "poisson": 0.3}]
+        >>> phases += [{"modulus": 80e9, "poisson": 0.2}]
+        >>> found = fuzzy_image_stiffness(image, phases, labels=[0, 1], progress=False)
+        >>> [f"{end / 1e9:.1f} GPa" for end in found.modulus.cut(0)]
+        ['25.2 GPa', '27.5 GPa']
     """
     listed = [ImagePhase.of(phase) for phase in phases]
     study = image_study(image, listed, thresholds=thresholds, labels=labels)

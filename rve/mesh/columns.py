@@ -71,38 +71,26 @@ def extrude(
     phase = phase[order]
     plane = replace(_quadratic(points, triangles, phase, radius, outline), lattice=lattice)
 
-    return PrismGrid(
-        plane,
-        cells=stacked(plane.triangles, layers, nodes=len(plane.points), vertices=len(points)),
-        heights=np.asarray(np.linspace(0, 1, layers + 1), float),
-        phase=np.tile(phase, layers),
-        names=NAMES if radius else NAMES[:1],
-        conforming=radius > 0,
-    )
-
-
-def stacked(triangles: Ints, layers: int, *, nodes: int, vertices: int) -> Ints:
-    """Return the prisms above six-node triangles, layer by layer, shape (layers · triangles, 15).
-
-    The nodes of all levels come first, level by level, then those of all mid-levels. A mid-level
-    has nodes at the vertices alone, since a serendipity prism has no node in the middle of a
-    rectangular face.
-
-    Args:
-        triangles: Vertices, then middles of the edges 01, 02 and 12, shape (triangles, 6).
-        layers: Number of layers, at least 1.
-        nodes: Number of nodes of the plane mesh.
-        vertices: Number of nodes on a mid-level: all vertices have smaller numbers.
-    """
-    on_levels = np.arange(layers + 1)[:, np.newaxis, np.newaxis] * nodes + triangles
-    first_on_mid_level = (layers + 1) * nodes + np.arange(layers) * vertices
+    # The nodes of all levels come first, then those of all mid-levels. A mid-level has nodes at the
+    # vertices alone, since a serendipity prism has no node in the middle of a rectangular face.
+    num_vertices = len(points)
+    num_nodes = len(plane.points)
+    on_levels = np.arange(layers + 1)[:, np.newaxis, np.newaxis] * num_nodes + plane.triangles
+    first_on_mid_level = (layers + 1) * num_nodes + np.arange(layers) * num_vertices
     # `BELOW` and `ABOVE` are the places of a prism's lower and upper six-node triangle in Basix's
     # order, `MID_LEVEL` those of the middles of its vertical edges.
     cells = np.empty((layers, len(triangles), 15), np.int64)
     cells[..., BELOW] = on_levels[:-1]
     cells[..., ABOVE] = on_levels[1:]
-    cells[..., MID_LEVEL] = first_on_mid_level[:, np.newaxis, np.newaxis] + triangles[:, :3]
-    return cells.reshape(-1, 15)
+    cells[..., MID_LEVEL] = first_on_mid_level[:, np.newaxis, np.newaxis] + triangles
+    return PrismGrid(
+        plane,
+        cells=cells.reshape(-1, 15),
+        heights=np.asarray(np.linspace(0, 1, layers + 1), float),
+        phase=np.tile(phase, layers),
+        names=NAMES if radius else NAMES[:1],
+        conforming=radius > 0,
+    )
 
 
 def _quadratic(
@@ -265,7 +253,7 @@ def _levels(prisms: Prisms) -> tuple[Array, Ints]:
         raise MeshError(
             f"the prism at ({x:.4g}, {y:.4g}, θ = {z:.4g}) does not stand on one level with its top"
             " on the next",
-            "extrude the plane along θ, all columns by the same layers",
+            "extrude the plane along θ, the third coordinate, all columns by the same layers",
         )
     return np.asarray(thetas), level
 

@@ -38,9 +38,7 @@ PRISM_15_BY_GMSH = "extrude with recombine, Mesh.SecondOrderIncomplete = 1, orde
 T = TypeVar("T", bound=Elements)
 
 
-def read_grid(
-    path: Path | str, theta: tuple[float, float] = (0.0, 1.0), layers: int = 1
-) -> PrismGrid:
+def read_grid(path: Path | str, theta: tuple[float, float] = (0.0, 1.0)) -> PrismGrid:
     """Read a mesh of the cell from a file in Gmsh's format MSH and check it.
 
     The mesh consists of 15-node prisms (Gmsh's "Prism 15") that stand in columns on a
@@ -51,7 +49,6 @@ def read_grid(
     Args:
         path: The file, of any version of MSH, text or binary.
         theta: Lowest and highest level of θ of extruded triangles.
-        layers: Layers of extruded triangles, at least 1.
 
     Returns:
         The prisms where the file has them (`fixed`), with nodes numbered level by level of θ.
@@ -69,9 +66,8 @@ def read_grid(
     except RefusedError as error:
         cure = error.cure or "write it anew by Gmsh"
         raise RefusedError("mesh.file", f"{path}, {error.value}", MESH_FILES, cure) from None
-    if mesh.dimension == SURFACE:
-        return checked_grid(read_plane(mesh).prisms(theta, layers))
-    prisms = read_prisms(mesh)
+    is_plane = mesh.dimension == SURFACE
+    prisms = read_plane(mesh).prisms(theta) if is_plane else read_prisms(mesh)
     return checked_grid(prisms)
 
 
@@ -90,11 +86,7 @@ def checked_grid(prisms: Prisms) -> PrismGrid:
             columns, edges without a middle node of their own, folded prisms, voids or overlaps,
             opposite sides that do not match, slits, or a material that changes along θ.
     """
-    try:
-        grid = grid_of(orient(prisms))
-    except MeshError:
-        _require_theta_last(prisms.points)
-        raise
+    grid = grid_of(orient(prisms))
     plane = grid.plane
     _require_one_middle_for_each_edge(plane.triangles, plane.points)
     grid = replace(grid, plane=replace(plane, lattice=lattice_of(plane.points)))
@@ -367,31 +359,6 @@ def _require_joined_columns(grid: PrismGrid) -> None:
             f"the column at ({x:.4g}, {y:.4g}) is {below} in a layer of θ and {above} in the next",
             "extrude each phase through all layers; a cell that changes at a level is two meshes,"
             " averaged by the weights of θ",
-        )
-
-
-def _require_theta_last(points: Array) -> None:
-    """Raise if the third coordinate of a cell is not the one along θ but one along a side.
-
-    It is called where prisms do not stand along the third coordinate. A square cell spans −1 … 1 in
-    the two coordinates of its sides, and any range along θ. If it spans −1 … 1 in the third
-    coordinate and in only one of the others, θ was taken along the remaining one. Of other cells,
-    and where all three span −1 … 1, nothing is raised, since the axes cannot be told apart.
-
-    Args:
-        points: Positions of the nodes, shape (n, 3), n at least 1.
-
-    Raises:
-        MeshError: θ is the first or the second coordinate; the hint says which axes to exchange.
-    """
-    ends = np.array([points.min(axis=0), points.max(axis=0)])
-    is_side = (np.abs(ends - [[-1], [1]]) <= SAME_PLACE).all(axis=0)
-    if is_side[2] and is_side.sum() == 2:
-        axis = int(np.argmin(is_side))
-        low, high = ends[:, axis]
-        raise MeshError(
-            f"the cell spans {low:.6g} … {high:.6g} along x{axis + 1} and −1 … 1 along x3",
-            f"turn the axes: exchange x{axis + 1} and x3, so that θ is the third coordinate",
         )
 
 

@@ -82,6 +82,13 @@ class PrismModel(CellModel):
             samples of a map are projected on two solutions; None: each is solved.
         outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
         lattice: "square", "hexagonal", or the sides [a, b] of a rectangle; see `lattice_of`.
+
+    Example:
+        >>> from alphacut.stochastic import HermiteMap
+        >>> model = PrismModel(mesh_size=0.5, layers=4, estimate=False)
+        >>> [result] = model.solve(HermiteMap(0.2, 0.1, 0.6, 0.1), Phase(20e9), [Phase(80e9)])
+        >>> f"{result.modulus / 1e9:.1f} GPa"
+        '22.8 GPa'
     """
 
     mesh_size: float = 0.15
@@ -165,9 +172,10 @@ class PrismModel(CellModel):
             inclusions: Materials of the particle, at least one.
 
         Returns:
-            One result for each inclusion, with errors against a more accurate model if `estimate`
-            is set. Properties that every right result has (symmetry, bounds of the stiffness) are
-            checked.
+            One HomogenisedStiffness for each inclusion: `modulus` and `poisson` of its average,
+            `stiffness` in Pa, `errors` by name against a more accurate model if `estimate` is set,
+            `energies` of the phases, `iterations` and `unknowns`. Properties that every right
+            result has (symmetry, bounds of the stiffness) are in `checks`.
 
         Raises:
             ConvergenceError: The linear solver stopped before its tolerance was reached.
@@ -406,11 +414,6 @@ class PrismModel(CellModel):
 def require_prisms(mesh_size: float, layers: int) -> None:
     """Refuse a mesh size or a number of layers that is not allowed."""
     require_mesh_size(mesh_size)
-    require_layers(layers)
-
-
-def require_layers(layers: int) -> None:
-    """Refuse a number of layers that is no whole number of 1 or more."""
     if not (is_number(layers, whole=True) and layers >= 1):
         allowed = "1 or more" if is_number(layers, whole=True) else "a whole number, 1 or more"
         raise RefusedError("the number of layers", repr(layers), allowed)

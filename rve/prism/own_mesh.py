@@ -34,7 +34,6 @@ from alphacut.rve.prism.model import (
     cached_grid,
     cached_problem,
     prism_result,
-    require_layers,
     require_prisms,
     with_distance,
 )
@@ -91,7 +90,8 @@ class _NamedModel(NamedPhasesModel):
                 "inclusion". Energies of the result are in the order of this mapping.
 
         Returns:
-            The result under three loads, so with the whole plane stiffness. It declares no error.
+            One HomogenisedStiffness under three loads, so with the whole plane `stiffness`. It
+            declares no error.
 
         Raises:
             MeshError: The file holds no mesh of a cell of prisms.
@@ -157,9 +157,10 @@ class _NamedModel(NamedPhasesModel):
 class MeshModel(_NamedModel):
     """The user's mesh of 15-node prisms, solved as it is, or of triangles that are extruded.
 
-    Plane triangles are extruded along θ over the support of its distribution. They have three or
-    six nodes; those of three are made quadratic and keep their straight sides, so that a round
-    particle is the polygon that the file has.
+    Plane triangles are extruded along θ over the support of its distribution, in one layer, which
+    is exact for phases that do not depend on θ. They have three or six nodes; those of three are
+    made quadratic and keep their straight sides, so that a round particle is the polygon that the
+    file has.
 
     With `refine` it is solved twice: as it is, and with each prism split into eight of its own
     curved shape, whose result is returned. The declared error is 2.5 times the distance of both; it
@@ -170,8 +171,6 @@ class MeshModel(_NamedModel):
     Args:
         file: File of Gmsh; its cell is a parallelogram or regular hexagon of any size and place. Or
             triangles in memory, as `from_dolfinx` gives them.
-        layers: Layers of extruded triangles, at least 1. One is exact for phases that do not depend
-            on θ.
         refine: Whether to refine the mesh once, for a declared error.
         petsc: PETSc options without their prefix `rve_`.
         parallel: Whether all MPI ranks work on one cell together.
@@ -181,13 +180,11 @@ class MeshModel(_NamedModel):
     petsc: Mapping[str, str] = field(default_factory=dict)
     parallel: bool = False
     refine: bool = False
-    layers: int = 1
 
     def __post_init__(self) -> None:
-        """RefusedError for options with a dash, no bool `refine`, or `layers` that are no count."""
+        """RefusedError unless `petsc` is a table of options without dash, and `refine` a bool."""
         require_petsc(self.petsc)
         require(isinstance(self.refine, bool), "refine", repr(self.refine), "True or False")
-        require_layers(self.layers)
 
     @classmethod
     def from_dolfinx(
@@ -204,7 +201,7 @@ class MeshModel(_NamedModel):
                 parallelogram or regular hexagon and have the same nodes on opposite sides.
             cell_tags: A tag for each cell, which names its phase.
             names: Names of the phases by tag; "group TAG" for tags that are not in it.
-            options: `petsc`, `parallel`, `refine` and `layers` of the model.
+            options: `petsc`, `parallel` and `refine` of the model.
 
         Raises:
             RefusedError: The mesh has other cells or is distributed over processes, a cell has no
@@ -306,7 +303,7 @@ class MeshModel(_NamedModel):
             changed = Path(source).stat().st_mtime_ns
         elif not isinstance(source, PlaneMesh):
             raise RefusedError("mesh.file", source, "path of a file of Gmsh")
-        read = _Read(source, changed, theta, self.layers)
+        read = _Read(source, changed, theta)
         return _mesh_problem(read, self.parallel, self.refine)
 
 
@@ -316,13 +313,12 @@ class _Read(NamedTuple):
     source: Path | str | PlaneMesh
     changed: int
     theta: tuple[float, float]
-    layers: int
 
     def grid(self) -> PrismGrid:
         """Return the checked grid of the file, or of the triangles in memory."""
         if isinstance(self.source, PlaneMesh):
-            return checked_grid(self.source.prisms(self.theta, self.layers))
-        return read_grid(self.source, self.theta, self.layers)
+            return checked_grid(self.source.prisms(self.theta))
+        return read_grid(self.source, self.theta)
 
 
 @lru_cache(maxsize=2)

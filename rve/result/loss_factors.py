@@ -54,6 +54,14 @@ def loss_factors(result: HomogenisedStiffness, losses: Array | None = None) -> D
         RefusedError: The result has no energies, or `losses` is not given and the result has no
             cell whose phases could state them.
         ValueError: `losses` is of another number of phases.
+
+    Example:
+        >>> from alphacut.rve import Phase, SeriesModel
+        >>> from alphacut.stochastic import HermiteMap
+        >>> phases = Phase(20e9, loss=0.04), Phase(80e9, 0.2, loss=0.01)
+        >>> [cell] = SeriesModel().solve(HermiteMap(0.2, 0.1, 0.6, 0.1), phases[0], [phases[1]])
+        >>> f"{loss_factors(cell).values['E']:.4f}"
+        '0.0383'
     """
     energies = result.energies
     if energies is None:

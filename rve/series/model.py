@@ -110,7 +110,8 @@ class SeriesModel(AnyModel):
             inclusions: Isotropic materials of the particle, which is solved with each.
 
         Returns:
-            Results with declared errors by "space" (series) and "theta" (quadrature), checks
+            A HomogenisedStiffness for each inclusion, with `modulus` and `poisson` of its average,
+            `stiffness` in Pa, declared errors by "space" (series) and "theta" (quadrature), checks
             against classical bounds, and the wall time of all together. Strain energies of the
             phases are there if `self.energies` is set or a phase has a loss factor.
 

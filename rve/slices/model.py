@@ -317,8 +317,9 @@ class SlicesModel(CellModel):
             inclusions: Materials of the particle, at least one.
 
         Returns:
-            Results with declared errors, energies of the phases, and violations of bounds as
-            checks. `seconds` of each is the time for all of them together.
+            A HomogenisedStiffness for each inclusion, with `modulus` and `poisson` of its average,
+            `stiffness` in Pa, declared `errors`, `energies` of the phases, and violations of bounds
+            as `checks`. `seconds` of each is the time for all of them together.
 
         Raises:
             ConvergenceError: A linear system was not solved.

@@ -332,7 +332,7 @@ def begun_late(points, cells, phase):
     [
         (lifted, "does not stand on one level"),
         (narrowed, r"the prisms fill .* %|not the parallelogram of the vectors"),
-        (laid_down, r"spans 0 … 2.5 along x1 .* exchange x1 and x3, so that θ is the third"),
+        (laid_down, r"does not stand on one level .* along θ, the third coordinate"),
         (with_a_hole, r"the prisms fill 9\d\.\d+% .* give holes a phase of their own"),
         (twice_the_particle, r"the prisms fill 112\.\d+% .* occ.fragment"),
         (cut_out, "has a prism on one side alone: a slit; .* Coherence"),

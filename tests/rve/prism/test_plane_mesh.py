@@ -84,7 +84,7 @@ def test_triangles_are_solved_as_the_prisms_above_them(order, binary, version, t
         gmsh.option.setNumber("Mesh.Binary", binary)
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.write(str(tmp_path / "plane.msh"))
-        tagged = of_dolfinx(gmsh, petsc=EXACT, layers=2)
+        tagged = of_dolfinx(gmsh, petsc=EXACT)
     plane = MeshModel(tmp_path / "plane.msh", petsc=EXACT)
     grid = plane.moved_problem(LAW).grid
     assert set(grid.names) == set(PHASES)
@@ -153,11 +153,11 @@ def test_meshes_of_dolfinx_that_do_not_fit_are_refused():
     with refuses("mesh"):
         MeshModel.from_dolfinx("plane.msh", tags)
     with refuses("cell_tags"):
+        MeshModel.from_dolfinx(square, cells)
+    with refuses("tagged cells"):
         MeshModel.from_dolfinx(square, dolfinx.mesh.meshtags(square, 2, cells[1:], cells[1:]))
-    with refuses("cell_tags"):
+    with refuses("tagged cells"):
         MeshModel.from_dolfinx(square, dolfinx.mesh.meshtags(square, 1, cells, cells))
     with refuses("tag of a name"):
         MeshModel.from_dolfinx(square, tags, {2: "matrix"})
-    with refuses("the number of layers"):
-        MeshModel.from_dolfinx(square, tags, layers=0)
     assert MeshModel.from_dolfinx(square, tags, {1: "hard"}).file.names == ("group 0", "hard")
