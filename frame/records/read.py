@@ -212,6 +212,10 @@ def _read_waveform(
         raise RefusedError(name, reason, "miniSEED or SAC that obspy reads") from None
     names = [(str(trace.stats.channel).lower(),) for trace in traces]
     trace = traces[choose_channel(f"{name} without gaps", channel, names)]
+    # The head of SAC may say what its samples are: 6 a displacement, 7 a velocity.
+    others = {6: "a displacement", 7: "a velocity"}
+    quantity = others.get(int(trace.stats.get("sac", {}).get("idep", 0)), "")
+    require(not quantity, name, quantity, "an acceleration, IDEP 8")
     require(bool(unit), name, "without a unit", "records.unit, as the network gives it")
     return recording_in_si(
         name,

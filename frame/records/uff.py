@@ -17,6 +17,7 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
 from alphacut.frame.records.recording import Recording
+from alphacut.frame.records.stated import named_quantity
 from alphacut.frame.records.text_file import NUMBER, choose_channel, decoded, recording_in_si
 from alphacut.frame.records.units import seconds_of
 
@@ -141,8 +142,8 @@ def _require_acceleration(key: str, data_set: DataSet) -> None:
         data_set: The data set, with the 11 lines of its head.
 
     Raises:
-        RefusedError: It is no time history, or its response is a displacement, a velocity or a
-            force.
+        RefusedError: It is no time history, or its response is by code or name a displacement, a
+            velocity or a force.
         ValueError: A code of the head is no whole number.
     """
     # Columns of the format: the function in line 6, the quantities of abscissa and ordinate at the
@@ -159,6 +160,10 @@ def _require_acceleration(key: str, data_set: DataSet) -> None:
     what = f"of type {quantity}, {others.get(quantity)}"
     cure = "choose the channel of an accelerometer, type 12"
     require(quantity not in others, key, what, "the response of an accelerometer", cure)
+    # Columns 27 to 46 of line 9 have the name of the ordinate.
+    label = data_set.head[8][26:47].strip()
+    named = named_quantity(label)
+    require(not named, key, f"of {label}, {named}", "the response of an accelerometer", cure)
 
 
 @dataclass(frozen=True)

@@ -128,9 +128,10 @@ def _stated_factor(path: Path) -> float:
     spelled |= {r"milli-?met(?:er|re)s?": "mm", r"\bmet(?:er|re)s?": "m", r"\s+per\s+": "/"}
     factors = {"k": 1e3, "M": 1e6, "G": 1e9, "N": 1.0, "t": 1e3}
     cure = "write the matrix in N, m, kg, or say override = ['unit'] if the comment is wrong"
-    for row, line in enumerate(path.read_text(encoding="latin-1").splitlines(), 1):
-        if not re.match(r"\s*(?:%|#|\*\*|\$|//)", line):
-            continue
+    content = path.read_bytes()
+    for comment in re.finditer(rb"(?m)^[ \t]*(?:[%#$]|\*\*|//).*$", content):
+        line = comment[0].decode("latin-1")
+        row = content.count(b"\n", 0, comment.start()) + 1
         place = f"{path.name}, line {row}"
         for pattern, symbol in spelled.items():
             line = re.sub(pattern, symbol, line, flags=re.IGNORECASE)

@@ -119,3 +119,13 @@ def test_a_data_set_that_ends_in_its_head_is_told_why(tmp_path):
         read_record(saved(tmp_path, start + b"    -1\n" + below))
     with refuses("record.uff"):
         read_record(saved(tmp_path, start + b"NONE\n"))
+
+
+def test_a_name_of_another_quantity_is_refused_where_code_and_unit_say_nothing(tmp_path):
+    path = tmp_path / "record.uff"
+    content = uff58(np.sin(np.arange(40) / 5), unit="NONE", spec=0)
+    path.write_bytes(content)
+    assert read_record(path, unit="g")
+    path.write_bytes(content.replace(b"Channel 1", b"Velocity "))
+    with refuses("record.uff, response 7.x"):
+        read_record(path, unit="g")
