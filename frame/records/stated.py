@@ -46,8 +46,9 @@ _G = (
 )
 _OTHER_UNIT = r"\bunits?\b\s*(?:(?:of|are|is|in)\b)?[\s:=]*[\[(]?([^\s,;\])]+)"
 _FACTOR = (
-    r"(?:[x×*·]\s*|\b)10\s*(?:\^|\*\*|[-−⁻])\s*\(?[-−⁻]?\s*[\d¹²³⁴⁵⁶⁷⁸⁹]|\b1\.?0*e[-+]?\d"
-    r"|[x×]\s*(?:1000*\b|0?\.0)|\b(?:scal\w*|multipl\w*|conversion)[\s_]*(?:factor)?[\s:=]*(?:by\s+)?"
+    r"(?:[x×*·]\s*|\b)10\s*(?:\^|\*\*|⁻|[²³⁴⁵⁶])|[x×*·]\s*10\s*[-−]\s*\d|\b1\.?0*e[-+]?\d"
+    r"|[x×]\s*(?:1000*\b|0?\.0)"
+    r"|\b(?:scal\w*[\s_]*factor|scal\w*(?=\s*[:=])|multipl\w*|conversion)[\s:=]*(?:by\s+)?"
     r"(?!1\.?0*\b)[\d.]"
 )
 _INTERVAL = (
@@ -94,8 +95,8 @@ class TextStatements:
             found._add_units(text, row, place)
             found.steps += _steps(text, place)
             pattern = (
-                r"\b(?:npts?|ndata|n_?samples|(?:n(?:umber|o|um|r)?\.?\s*(?:of)?\s*)?"
-                r"(?:data|points|samples|values|pts))\s*[:=]\s*(\d+)\b(?!\.)"
+                r"\b(?:npts?|ndata|n_?samples|points|samples|n(?:umber|o|um|r)?\.?\s*(?:of)?\s*"
+                r"(?:data|points|samples|values|pts))\s*[:=]\s*(\d+)\b(?![./:-])"
             )
             for match in re.finditer(pattern, text, re.IGNORECASE):
                 found.counts.append(Stated(float(match[1]), f"{match[1]} samples", place))
@@ -138,7 +139,10 @@ class TextStatements:
             is_named = re.search(r"\bunits?\b", text, re.IGNORECASE) is not None
             if name and (is_named or not is_length) and not re.search(is_of_site, text):
                 self.quantities.append((f"{name} by its unit {unit}", row))
-        if not is_peak and (name := named_quantity(text)):
+        # Loads, angles and drifts of an instrument or a site are no quantity of the numbers.
+        name = named_quantity(text)
+        is_quantity = name.endswith(("displacement", "velocity", "spectrum", "counts", "voltage"))
+        if is_quantity and not is_peak and not re.search(is_of_site, text):
             self.quantities.append((name, row))
 
 
