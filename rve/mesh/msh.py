@@ -77,15 +77,15 @@ def read_msh(content: bytes) -> MshFile:
     is_sound = bool(np.isfinite(read["points"]).all() and (np.diff(rising) > 0).all())
     elements: dict[tuple[int, int], Ints] = {}
     kinds: dict[int, str] = {}
-    ends = np.cumsum(read["sizes"])
-    rows = zip(read["keys"], read["widths"], read["kinds"], ends, read["sizes"], strict=True)
-    for (entity, kind), width, name, end, size in rows:
-        wanted = read["nodes"][end - size : end].reshape(-1, width)
+    for key, wanted in read.items():
+        if not key.startswith("block "):
+            continue
+        _, entity, kind, *words = key.split()
         place = np.minimum(np.searchsorted(rising, wanted), max(len(rising) - 1, 0))
         is_sound = is_sound and bool(len(rising)) and bool((rising[place] == wanted).all())
         if is_sound:
             elements[int(entity), int(kind)] = order[place]
-        kinds[int(kind)] = str(name)
+        kinds[int(kind)] = " ".join(words)
     if not is_sound:
         reason = "with a node that is not there, stands twice or has no place"
         raise RefusedError("mesh.file", reason, "whole meshes", "write it anew by Gmsh")
@@ -102,10 +102,9 @@ def arrays_of_gmsh(path: Path) -> dict[str, NDArray[Any]]:
     """Return what Gmsh reads from a mesh, in arrays: the reader that runs apart.
 
     Returns:
-        tags (nodes,) and points (nodes, 3); for each block of elements of one type and entity its
-        keys (entity, type), widths (nodes of one), sizes (nodes of all), kinds (name of the type),
-        and all nodes one block after another; groups and their names; members (group, entity);
-        entities; and numbers: the dimension and the count of partitions.
+        tags (nodes,) and points (nodes, 3); for each type of element of an entity "block ENTITY
+        TYPE NAME", the tags of their nodes, shape (elements, nodes of one); groups and their names;
+        members (group, entity); entities; and numbers: the dimension and the count of partitions.
 
     Raises:
         RuntimeError: Gmsh says that the file is wrong.
@@ -123,32 +122,22 @@ def arrays_of_gmsh(path: Path) -> dict[str, NDArray[Any]]:
     tags, points, _ = gmsh.model.mesh.getNodes()
     dimension = VOLUME if gmsh.model.getEntities(VOLUME) else SURFACE
     entities = [tag for _, tag in gmsh.model.getEntities(dimension)]
-    keys: list[tuple[int, int]] = []
-    widths: list[int] = []
-    kinds: list[str] = []
-    blocks: list[NDArray[Any]] = []
+    blocks: dict[str, NDArray[Any]] = {}
     for entity in entities:
         found, _, nodes = gmsh.model.mesh.getElements(dimension, entity)
         for kind, block in zip(found, nodes, strict=True):
             name, _, _, width, _, _ = gmsh.model.mesh.getElementProperties(kind)
-            keys.append((entity, int(kind)))
-            widths.append(width)
-            kinds.append(name)
-            blocks.append(block)
+            rows = np.asarray(block, np.int64).reshape(-1, width)
+            blocks[f"block {entity} {kind} {name}"] = rows
     groups = [tag for _, tag in gmsh.model.getPhysicalGroups(dimension)]
     members = [
         (group, int(entity))
         for group in groups
         for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, group)
     ]
-    return {
+    return blocks | {
         "tags": np.asarray(tags, np.int64),
         "points": np.reshape(points, (-1, 3)),
-        "keys": np.reshape(np.array(keys, np.int64), (-1, 2)),
-        "widths": np.array(widths, np.int64),
-        "sizes": np.array([len(block) for block in blocks], np.int64),
-        "kinds": np.array(kinds, str),
-        "nodes": np.concatenate([np.empty(0, np.int64), *blocks]).astype(np.int64),
         "groups": np.array(groups, np.int64),
         "names": np.array([gmsh.model.getPhysicalName(dimension, g) for g in groups], str),
         "members": np.array(members, np.int64),
