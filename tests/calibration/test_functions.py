@@ -8,7 +8,7 @@ import pytest
 
 from alphacut.fuzzy import Knowledge, Nature, Reduced, RefusedError, Signed, Triangular, propagate
 from tests.calibration import functions
-from tests.calibration.declared import Calibration, free_seed
+from tests.calibration.declared import Calibration, free_seed, is_rate
 
 ALPHA = (0.0, 0.5)
 
@@ -27,7 +27,7 @@ def wide(rng, n):
 
 @pytest.mark.slow
 def test_estimates_of_three_hundred_functions():
-    """At most 1 % of the estimated bounds are wrong; most functions have an estimate."""
+    """Less than 1 % of the estimated bounds are wrong; most functions have an estimate."""
     seed = free_seed("three hundred functions")
     families = [*functions.SINGLE * 3, *functions.SEVERAL]
     natures, wrong, costs = {}, [], {}
@@ -50,9 +50,9 @@ def test_estimates_of_three_hundred_functions():
     single = [*chain.from_iterable(natures[family.__name__] for family in functions.SINGLE)]
     print(f"{sum(total)} of {len(total)} estimated, of single optima {np.mean(single):.0%}")
     print(f"wrong: {wrong}")
-    assert len(wrong) <= 0.01 * sum(total), (wrong, seed)
-    assert np.mean(single) >= 0.9, seed
-    assert np.mean(total) >= 0.6, seed
+    assert is_rate(len(wrong), sum(total), 0.01), (wrong, seed)
+    assert is_rate(len(single) - sum(single), len(single), 0.1), seed
+    assert is_rate(len(total) - sum(total), len(total), 0.4), seed
 
 
 def shortfall(function, inputs, result):

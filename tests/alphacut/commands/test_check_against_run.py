@@ -104,8 +104,8 @@ def place(tmp_path):
     return tmp_path
 
 
-def test_what_check_passes_run_takes(place, capfd):
-    seed = int(os.environ.get("SEED", random.randrange(10**9)))
+def test_what_check_passes_run_takes(place, capfd, rng):
+    seed = int(rng.integers(10**9))
     trials, passed = int(os.environ.get("TRIALS", "1")), 0
     for trial in range(seed, seed + trials):
         draw = random.Random(trial)
@@ -184,8 +184,8 @@ def mutated(text, draw):
 
 
 @pytest.mark.parametrize("text", [FRAME, CELL], ids=["frame", "cell"])
-def test_a_mutated_case_is_read_or_refused_in_lines(tmp_path, capfd, text):
-    seed = random.randrange(10**9)
+def test_a_mutated_case_is_read_or_refused_in_lines(tmp_path, capfd, text, rng):
+    seed = int(rng.integers(10**9))
     for trial in range(EACH):
         draw = random.Random(seed + trial)
         case = written(tmp_path, "")

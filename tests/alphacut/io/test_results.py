@@ -145,8 +145,8 @@ def check_damage(finished, place, seed, kinds, capfd):
 
 
 @pytest.mark.parametrize("kinds", [CHANGES, STRANGE], ids=["changes", "strange"])
-def test_damaged_results_are_computed_anew_or_refused(finished, tmp_path, kinds, capfd):
-    seed = int(os.environ.get("SEED", random.randrange(10**9)))
+def test_damaged_results_are_computed_anew_or_refused(finished, tmp_path, kinds, capfd, rng):
+    seed = int(rng.integers(10**9))
     for trial in range(int(os.environ.get("TRIALS", "2"))):
         place = tmp_path / str(trial)
         place.mkdir()

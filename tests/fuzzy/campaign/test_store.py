@@ -99,9 +99,9 @@ DAMAGES = [flip, flip, truncate, overwrite, lose_or_insert]
 
 
 @pytest.mark.parametrize("first", [0, pytest.param(None, marks=pytest.mark.slow)])
-def test_no_damage_is_silently_wrong(tmp_path, first):
+def test_no_damage_is_silently_wrong(tmp_path, rng, first):
     """The same bits, or one line, and lost samples run anew; a free seed in the slow test."""
-    first = random.randrange(10**9) if first is None else first
+    first = int(rng.integers(1, 10**9)) if first is None else first
     path, seeds = tmp_path / "s.db", range(first, first + (200 if first else 30))
     reference = bits(run(path))
     content, outcomes = path.read_bytes(), dict.fromkeys(("untouched", "mended", "refused"), 0)

@@ -58,8 +58,8 @@ def test_a_noisy_image_is_right_or_refused(seed):
 
 
 @pytest.mark.slow
-def test_forty_noisy_images_are_right_or_refused(request):
-    seed = np.random.SeedSequence().entropy % 10**6
+def test_forty_noisy_images_are_right_or_refused(rng):
+    seed = int(rng.integers(10**6))
     outcomes = [outcome([seed, k]) for k in range(40)]
     assert not [word for word in outcomes if word.startswith("wrong")], seed
     assert "right" in outcomes, seed  # most need scikit-image's denoising first
