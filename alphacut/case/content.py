@@ -19,6 +19,7 @@ from alphacut.case.spectrum import ResponseSpectrumSection
 from alphacut.case.structure import MaterialDamping, Structure, StructureSection
 from alphacut.case.structures import STRUCTURES, with_structures
 from alphacut.case.types import AtFirstUse, require_alone
+from alphacut.frame import Limit
 from alphacut.frame.structures.storey import yields
 from alphacut.fuzzy import FuzzyNumber
 
@@ -86,6 +87,17 @@ class Content(CellContent):
                     name = limit.output
                 peaks[name] = None
         return tuple(peaks)
+
+    def limits_where_yielding(self, structure: Structure) -> tuple[Limit, ...]:
+        """Return the limits, in SI units, to which the questions need the peaks of a structure.
+
+        Peaks of linear structures are bounded closely in any case: they have none.
+        """
+        if not yields(structure.model):
+            return ()
+        asked = [x for x in self.questions.values() if x.reads_peaks]
+        limits = [side for x in asked for y in x.limits_of(structure) for side in y.one_sided]
+        return tuple(limits)
 
     @property
     def stated_fraction(self) -> float | None:

@@ -266,7 +266,9 @@ class Pipeline:
             response = self._suite_response(content.records, structure, task)
         else:
             self._compute_envelopes(structure, section)
-            peaks = self._limited_peaks(replace(task, limited=content.limited_outputs), structure)
+            limits = content.limits_where_yielding(structure)
+            task = replace(task, limited=content.limited_outputs, limits=limits)
+            peaks = self._limited_peaks(task, structure)
             response = Response(structure, task, peaks)
         for key, question in content.asked().items():
             results.answers[key] = self.store.take(answers.stage(key, question, response)).numbers
@@ -344,7 +346,12 @@ class Pipeline:
         content = self.content
         for warning in load_end_warnings(content, structure):
             say(f"warning: {warning}")
-        results.tasks = envelope.tasks(section, content.study, content.limited_outputs)
+        results.tasks = envelope.tasks(
+            section,
+            content.study,
+            content.limited_outputs,
+            content.limits_where_yielding(structure),
+        )
         # The longest tasks begin, so that none of them is left to the end alone. Their time grows
         # about as inputs times duration.
         longest_first = sorted(results.tasks, key=lambda task: -len(task.fuzzy) * task.duration)
@@ -380,7 +387,8 @@ class Pipeline:
                 say(f"warning: {warning}")
         # Peaks are computed of all outputs, and of those that questions limit besides.
         limited = tuple(dict.fromkeys(structure.outputs + self.content.limited_outputs))
-        task = replace(task, limited=limited)
+        limits = self.content.limits_where_yielding(structure)
+        task = replace(task, limited=limited, limits=limits)
         longest_first = sorted(records, key=lambda record: -record.duration)
         stages = [suite.stage(structure, task, record) for record in longest_first]
         outcomes = self.store.take_all(stages, self.executor)

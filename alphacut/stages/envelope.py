@@ -15,6 +15,7 @@ from alphacut.base.errors import FailedError, require
 from alphacut.base.progress_bar import Progress, searching, subprogress
 from alphacut.case.motion import EnvelopeSection, Study, Tolerance
 from alphacut.case.structure import Structure
+from alphacut.frame.analyses.limits import thresholds_of
 from alphacut.frame.analyses.peaks import (
     PEAK_ERROR,
     Peak,
@@ -88,6 +89,7 @@ class EnvelopeTask:
         section: What holds for all studies.
         figures: Outputs that are drawn, each with its number in the paper; empty for all.
         limited: Peaks that a question compares with a limit.
+        limits: The limits, in SI units.
     """
 
     name: str
@@ -96,6 +98,7 @@ class EnvelopeTask:
     section: EnvelopeSection
     figures: Mapping[str, str] = field(default_factory=dict)
     limited: tuple[str, ...] = ()
+    limits: tuple[frame.Limit, ...] = ()
 
     def tolerance(self, structure: Structure) -> Tolerance:
         """Return the error of the envelope that the case allows, or a thousandth of each peak.
@@ -275,6 +278,8 @@ class EnvelopeTask:
             if method in FOLLOWERS:
                 tolerance *= section.gain
             arguments["tolerance"] = tolerance
+        if method in ("auto", "proof") and self.limits:
+            arguments["thresholds"] = thresholds_of(structure.model, self.limits)
         return arguments
 
     def close_peaks(self, structure: Structure, progress: Progress) -> dict[str, Peak]:
@@ -282,7 +287,13 @@ class EnvelopeTask:
         # The structure is observed at the limited outputs alone: fewer outputs are a faster proof.
         structure.require_quantities("limits", outputs_of(self.limited))
         response = self._response(structure)
-        return close_peaks(structure.model, names=self.limited, progress=progress, **response)
+        return close_peaks(
+            structure.model,
+            names=self.limited,
+            limits=self.limits,
+            progress=progress,
+            **response,
+        )
 
     def _response(self, structure: Structure) -> dict[str, Any]:
         """Return the arguments that say which response is meant, by name.
@@ -307,7 +318,10 @@ def outputs_of(peaks: Sequence[str]) -> tuple[str, ...]:
 
 
 def tasks(
-    section: EnvelopeSection, studies: Sequence[Study], limited: tuple[str, ...] = ()
+    section: EnvelopeSection,
+    studies: Sequence[Study],
+    limited: tuple[str, ...] = (),
+    limits: tuple[frame.Limit, ...] = (),
 ) -> tuple[EnvelopeTask, ...]:
     """Return the task of each study of a case; without studies that of [envelope], named "all".
 
@@ -316,6 +330,7 @@ def tasks(
         studies: Names of the fuzzy inputs, duration and drawn outputs of each study.
         limited: Names of the peaks that questions limit. They go to the tasks with the inputs and
             the duration of [envelope] alone.
+        limits: Their limits, in SI units.
     """
     found = [EnvelopeTask(x.name, x.fuzzy, x.duration, section, x.figures) for x in studies]
     if not found:
@@ -325,7 +340,7 @@ def tasks(
     tasks_of_case = []
     for task in found:
         if task.has_response_of(section):
-            task = replace(task, limited=limited)
+            task = replace(task, limited=limited, limits=limits)
         tasks_of_case.append(task)
     return tuple(tasks_of_case)
 
@@ -334,7 +349,7 @@ def stage(structure: Structure, task: EnvelopeTask) -> Stage[EnvelopeResult]:
     """Return the stage of one study."""
     # The outputs that are drawn and the name are left out: neither changes a bound.
     inputs = [structure.model, structure.numbers, task.fuzzy, task.duration, task.section]
-    inputs += [task.limited, structure.learned]
+    inputs += [task.limited, task.limits, structure.learned]
     compute = partial(task.compute, structure)
     return Stage(f"envelope_{task.name}", inputs, ("fuzzy", "frame"), EnvelopeResult, compute)
 

@@ -184,6 +184,7 @@ def _peaks(
         task.limited,
         step=task.section.step,
         alpha=task.section.alpha,
+        limits=task.limits,
         progress=context.tick,
     )
     if task.section.method in ("proof", "dual"):

@@ -94,9 +94,12 @@ class LimitDecision(LimitResult):
 
         Such a response is named by its inputs, and by its record if there is a suite: "can be
         exceeded, as at k1 = 38.00 MN/m, record RSN953". If all or no responses exceed the limit,
-        or no inputs are known, the verdict stands alone. A lowest computed level other than 0 is
+        or no inputs are known, the verdict stands alone. Where a proof to the limit has left part
+        of the box open, an undecided one says which. A lowest computed level other than 0 is
         then added: "not exceeded from α = 0.5 up".
         """
+        if self.verdict == "undecided" and self.peak is not None and self.peak.is_to_limits:
+            return f"{self.verdict}: {self.peak.cause}"
         # If all responses exceed the limit, a single one is no news.
         is_by_some = self.verdict == "can be exceeded"
         if not is_by_some or self.peak is None or not self.peak.reached_at:
@@ -184,6 +187,8 @@ class Decision(Answer):
                 # The bound is an end of an interval that is open on the other side.
                 relation = {"lower": "≥", "upper": "≤"}[part.peak.bound_side]
                 bound_text = f"{relation} {bound_text}"
+                if part.peak.is_to_limits:
+                    bound_text += ", not sought closer"
             attained_text = part.text_of(attained, part.peak.bound_side, Nature.ATTAINED)
             # A gap of a bound of zero has no meaning as a fraction.
             if bound and np.isfinite(bound) and np.isfinite(attained):

@@ -107,6 +107,13 @@ def missing_guarantee(model: StructureModel, band: Envelope, output: str) -> str
     return f"{reason}; narrow {_most_important(model, band, output)} first"
 
 
+def open_part(band: Envelope) -> str:
+    """Return which part of the box a proof to limits has left open; empty if there is none."""
+    return next(
+        (x for x in band.notes if x.partition(" % ")[2].startswith("of the box is closed")), ""
+    )
+
+
 def wide_gap(
     model: StructureModel, band: Envelope, output: str, *, gap: float, between: float
 ) -> str:

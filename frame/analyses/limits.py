@@ -14,6 +14,7 @@ from alphacut.frame.structures.linear import has_matrices
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import yields
+from alphacut.frame.threshold import Threshold
 
 Side = Literal["", "max", "min", "mean"]
 """What is limited: the largest magnitude, the largest value or the smallest value of an output over
@@ -272,6 +273,20 @@ def about_limit(limit: Limit, unit: str) -> LimitResult:
     return LimitResult(
         side=limit.side, output=limit.output, unit=unit, limit=limit.number, stated=limit.stated
     )
+
+
+def thresholds_of(model: StructureModel, limits: Sequence[Limit]) -> tuple[Threshold, ...]:
+    """Return limits as the question that a proof answers; none if it has to bound peaks closely.
+
+    The latter is so of linear structures, and where a mean over records is limited.
+
+    Args:
+        model: The structure.
+        limits: Limits with one value each, in SI units.
+    """
+    if not yields(model) or any(limit.mean for limit in limits):
+        return ()
+    return tuple(Threshold(x.output, x.outwards, x.largest) for x in limits)
 
 
 def require_fragile(model: StructureModel, limits: Sequence[Limit]) -> None:

@@ -15,7 +15,8 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.progress_bar import Progress
-from alphacut.frame.analyses.gap_causes import missing_guarantee, wide_gap
+from alphacut.frame.analyses.gap_causes import missing_guarantee, open_part, wide_gap
+from alphacut.frame.analyses.limits import Limit, thresholds_of
 from alphacut.frame.boxes import ALPHA
 from alphacut.frame.dynamics.yielding import AT_NODES
 from alphacut.frame.methods.auto import Auto
@@ -70,6 +71,7 @@ class Peak:
             encloses. If it is given, no response is known to belong to the set.
         cause: Why the bound is not guaranteed though a proof was tried, or why it is more than a
             tenth above the attained value, and what would narrow it; empty otherwise.
+        is_to_limits: Whether the bound was sought no closer than limits ask.
         worst: Where the peak is one over all angles of the ground motion, the angle and the time of
             the attained peak on the lowest level; else None.
 
@@ -92,6 +94,7 @@ class Peak:
     encloses: str = ""
     worst: WorstCase | None = None
     cause: str = ""
+    is_to_limits: bool = False
     proved: Array = field(init=False)
 
     def __post_init__(self) -> None:
@@ -555,6 +558,7 @@ def close_peaks(
     alpha: Sequence[float] = ALPHA,
     error: float = PEAK_ERROR,
     dual_first: bool = False,
+    limits: Sequence[Limit] = (),
     progress: Progress | bool | None = None,
 ) -> dict[str, Peak]:
     """Return fuzzy peaks of a structure, by the method that bounds them most closely.
@@ -573,6 +577,8 @@ def close_peaks(
         error: Error that is aimed at, and need not be reached, as a fraction of each peak.
         dual_first: Whether the dual bound is tried first: it is sooner done, and no better than
             the error.
+        limits: Limits of some of these peaks, with one value each. If columns yield, the effort
+            goes to the question whether they hold, and bounds are sought no closer.
         progress: Called with the completed fraction; None shows a bar on a terminal, False shows
             nothing.
 
@@ -587,7 +593,13 @@ def close_peaks(
     band = envelope(
         model.with_outputs(outputs),
         inputs,
-        Auto(error, peaks=True, magnitudes=magnitudes, dual_first=dual_first),
+        Auto(
+            error,
+            peaks=True,
+            magnitudes=magnitudes,
+            dual_first=dual_first,
+            thresholds=thresholds_of(model, limits),
+        ),
         duration=duration,
         step=step,
         alpha=alpha,
@@ -608,12 +620,15 @@ def with_causes(found: Peaks, model: StructureModel, band: Envelope) -> dict[str
     for name, peak in found.items():
         cause = ""
         gap = float(peak.gaps[0])
+        is_to_limits = bool(band.facts.get("sought_to_limits"))
         if peak.nature is not Nature.GUARANTEED:
             cause = missing_guarantee(model, band, output_of(name))
+        elif is_to_limits:
+            cause = open_part(band)
         elif gap > WIDE:
             between = peak.between_nodes / abs(float(peak.far_end[0]))
             cause = wide_gap(model, band, output_of(name), gap=gap, between=between)
-        peaks_with_causes[name] = replace(peak, cause=cause)
+        peaks_with_causes[name] = replace(peak, cause=cause, is_to_limits=is_to_limits)
     return peaks_with_causes
 
 

@@ -22,6 +22,7 @@ from alphacut.base.number_text import (
 from alphacut.base.progress_bar import Progress, nth_subprogress
 from alphacut.frame.analyses.angles import TURN, angle_peaks, angle_response
 from alphacut.frame.analyses.answer import Answer, Record, known, table_of
+from alphacut.frame.analyses.limits import Limit
 from alphacut.frame.analyses.peaks import Peak, Peaks, close_peaks, largest_peaks, with_combined
 from alphacut.frame.boxes import ALPHA, boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
@@ -327,6 +328,7 @@ def record_peaks(
     *,
     step: float,
     alpha: Sequence[float],
+    limits: Sequence[Limit] = (),
     progress: Progress | bool | None = None,
 ) -> dict[str, Peak]:
     """Return fuzzy peaks of a structure under a record, by name.
@@ -341,6 +343,7 @@ def record_peaks(
             "min q3" for its largest and smallest value.
         step: Step, in s.
         alpha: Levels, rising within [0, 1].
+        limits: See `close_peaks`.
         progress: Called with the completed fraction; None shows a bar on a terminal, False shows
             nothing.
 
@@ -352,7 +355,7 @@ def record_peaks(
     moved = model.moved_by(*record.components)
     if record.all_angles:
         return angle_peaks(moved, inputs, names, **motion, progress=progress).peak
-    return close_peaks(moved, inputs, names, **motion, progress=progress)
+    return close_peaks(moved, inputs, names, **motion, limits=limits, progress=progress)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

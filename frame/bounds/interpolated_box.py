@@ -61,6 +61,13 @@ ROUNDING = 1e-9
 EXTRA_INTERVALS = 60
 # Elements of one march at most, for each interval of the loads and each substep between samples.
 MAX_ELEMENTS = 8
+# Norm S, as a multiple of the largest room for events that are left out, at which a box is given up
+# as too wide, and the part of this room that an element may take without a closer look (tuned).
+GIVE_UP = 10.0
+SMALL_VIOLATION = 1e-4
+# Length of an element that begins and ends at fixed times, as a fraction of the largest one (tuned:
+# the polynomial of the load misses little of intervals that are much shorter).
+STRIDE = 0.25
 # Numbers of one array up to which elements are treated together (tuned to the processor's caches).
 CHUNK = 400_000
 # How far the slider may be moved by events that are left out if nothing else is known, and by one
@@ -254,7 +261,9 @@ class InterpolatedFrame:
             return self.infinite
         elements, count = found
         start = self._start_error(properties, model, elements)
-        bounds = _Sweep(self, model, rows, elements, count).run(start)
+        most = np.inf if room is None else GIVE_UP * float(room.max())
+        small = 0.0 if room is None else SMALL_VIOLATION * float(room.min())
+        bounds = _Sweep(self, model, rows, elements, count, most, small).run(start)
         if bounds is None:
             return self.infinite
         for values in (bounds.upper, bounds.steps, bounds.peaks):
@@ -452,8 +461,9 @@ class InterpolatedFrame:
         spectral = np.ascontiguousarray(
             coefficients(np.eye(n_sets), len(self.active), model.degree).T
         )
+        stride = max(int(STRIDE * longest / width), 1)
         status, count = march(
-            frames, loads, start, last, longest, window, moved, small, spectral, elements
+            frames, loads, start, last, longest, window, moved, small, stride, spectral, elements
         )
         if status != DONE:
             return None
@@ -642,6 +652,8 @@ class _Sweep:
     """Bounds of errors and outputs along the elements of interpolated motions.
 
     Attributes:
+        give_up: Value of S at which the box is given up, in J^½.
+        small: Growth of S on an element that is not bounded more closely, in J^½.
         norm: Bounds of S at the end of the elements that are done, on parts of the box, (parts,).
         drift: Bound of ∫ (‖b‖ S + |bᵀ δ_q|) dt, in m.
         path: By how much that of the plastic path is off by defects and changes of side, in m.
@@ -657,12 +669,16 @@ class _Sweep:
         rows: OutputRows,
         elements: Elements,
         count: int,
+        give_up: float,
+        small: float,
     ) -> None:
         self.frame = frame
         self.model = model
         self.rows = rows
         self.elements = elements
         self.count = count
+        self.give_up = give_up
+        self.small = small
         self.drift = 0.0
         self.path = 0.0
         self.side = 0
@@ -707,17 +723,19 @@ class _Sweep:
         return BoxBounds(self.upper, self.steps, self.peaks, float(self.norm.max()), history)
 
     def _add(self, chosen: slice) -> bool:
-        """Add some elements to all bounds; False where times, or the slider's side, go astray."""
+        """Add some elements to all bounds; False where the box is too wide for bounds."""
         model = self.model
         rows = self.rows
         found = interpolate(model, self.elements, chosen, with_rates=rows.uses_rates)
         if found is None:
             return False
-        missed = defects(found, self.elements.event[chosen])
+        missed = defects(found, self.elements.event[chosen], self.small)
         growth = missed.growth[:, np.newaxis] + missed.violation
         norms = self.norm + growth.cumsum(axis=0)
         self.norm = norms[-1]
         most = norms.max(axis=1)
+        if self.norm.min() > self.give_up:
+            return False
         by_norm = self._drift_errors(found, missed.drift, most)
         off = np.minimum(by_norm, most / np.sqrt(max(model.stiffness_ends[0, model.place], 1e-300)))
         path = self._path_errors(found, missed, off, most)

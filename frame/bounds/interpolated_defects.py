@@ -351,8 +351,14 @@ def _composition_errors(
     return errors
 
 
-def defects(found: Interpolant, event: Ints) -> Defects:
-    """Bound the defects of interpolated motions; `event` is that of `Elements`, shape (e,)."""
+def defects(found: Interpolant, event: Ints, small: float = 0.0) -> Defects:
+    """Bound the defects of interpolated motions.
+
+    Args:
+        found: The motions.
+        event: That of `Elements`, shape (e,).
+        small: Growth of S by an event that is left out that is not bounded more closely, in J^½.
+    """
     model = found.model
     shape = found.drift.shape[0]
     growth, drift = _residuals(found)
@@ -363,7 +369,9 @@ def defects(found: Interpolant, event: Ints) -> Defects:
     level, variation = _slider_errors(found)
     force = found.slider_force
     for e in _elastic_violations(found, force, level):
-        moved, beyond[e], forced, rise = _elastic_violation(model, force[e], level[e], variation[e])
+        moved, beyond[e], forced, rise = _elastic_violation(
+            model, force[e], level[e], variation[e], small
+        )
         # |δ_j| adds up to what the slider falls back, and forces miss what it is beyond meanwhile.
         forced = forced * found.max_length[e]
         violation[e] = moved / np.sqrt(model.slider_ends[0]) + model.direction_norm * forced
@@ -522,7 +530,7 @@ def ranges(model: BoxModel, values: Array) -> tuple[Array, Array]:
 
 
 def _elastic_violation(
-    model: BoxModel, force: Array, level: float, variation: float
+    model: BoxModel, force: Array, level: float, variation: float, small: float
 ) -> tuple[Array, Array, Array, float]:
     """Bound what is left out where the slider of an elastic storey passes its yield force.
 
@@ -536,6 +544,7 @@ def _elastic_violation(
         force: The slider's force by powers of τ, shape (K, F), in N.
         level: Bound of what it misses, in N.
         variation: Bound of the derivative by τ of what it misses, in N.
+        small: See `defects`.
 
     Returns:
         On each part of the box: bounds of what the force falls beyond the yield force, in N; of by
@@ -543,9 +552,10 @@ def _elastic_violation(
         anywhere in the box, in N.
     """
     best = _elastic_violation_on(model, force, level, variation, TIME_PARTS[0])
+    enough = max(SMALL_VIOLATION * model.force_ends[0], small * np.sqrt(model.slider_ends[0]))
     for pieces in TIME_PARTS[1:]:
         # Control points on shorter parts of the time lie closer to the force.
-        if not best[0].max() > SMALL_VIOLATION * model.force_ends[0]:
+        if not best[0].max() > enough:
             break
         closer = _elastic_violation_on(model, force, level, variation, pieces)
         gain = best[0].max() / max(closer[0].max(), 1e-300)

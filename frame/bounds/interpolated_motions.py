@@ -415,7 +415,7 @@ def _mark_behind(loads: LoadIntegrals, t: float) -> int:
 @compiled
 def march(
     frames: Frames, loads: LoadIntegrals, start: Array, last: int, longest: float, window: float,
-    room: Array, small: float, spectral: Array, out: Elements,
+    room: Array, small: float, stride: int, spectral: Array, out: Elements,
 ) -> tuple[int, int]:  # fmt: skip
     """Write the motions of J frames with one order of events, and return how this ends.
 
@@ -431,6 +431,7 @@ def march(
         window: Largest difference of the times of an event, in s.
         room: How far the slider may be moved at most from each interval on, in m, shape (E,).
         small: How far an event that all motions have may move the slider if it is left out, in m.
+        stride: Intervals of the loads between two fixed times at which elements begin and end.
         spectral: Matrix from values at the parameter sets to Chebyshev coefficients, (J, J).
         out: Receives the elements.
 
@@ -487,11 +488,12 @@ def march(
                 return NO_COMMON_ORDER, element
             spent += COST * most
         is_fresh = False
-        mark = edge + 1 if is_fixed else _mark_behind(loads, t.max())
+        # Between the parameter sets an event may come earlier, or later, than at all of them.
+        mark = min(edge + stride, last) if is_fixed else _mark_behind(loads, _most(t, spectral))
         if mark >= len(loads.powers):
             return TOO_MANY, element
         spacing = loads.edges[mark] - loads.edges[mark - 1]
-        is_event = event_time.min() <= loads.edges[mark] + 0.5 * spacing
+        is_event = -_most(-event_time, spectral) <= loads.edges[mark] + 0.5 * spacing
         for j in range(n_sets):
             new[j] = event_time[j] if is_event else loads.edges[mark]
         if new.max() >= until:

@@ -158,7 +158,11 @@ def part_maxima(
     found = along_inputs(part_matrix(degree, kept, parts), values, inputs)
     for _ in range(inputs):
         # the last input's coefficients are reduced, and its parts moved to the front
-        found = found.reshape(*head, -1, parts, kept + 1).max(axis=-1)
-        found = np.moveaxis(found, -1, len(head))
+        found = found.reshape(*head, -1, parts, kept + 1)
+        # NumPy reduces a short last axis slowly.
+        largest = found[..., 0]
+        for number in range(1, kept + 1):
+            largest = np.maximum(largest, found[..., number])
+        found = np.moveaxis(largest, -1, len(head))
         found = found.reshape(*head, -1)
     return found

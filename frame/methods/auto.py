@@ -37,6 +37,7 @@ from alphacut.frame.result import Ends, Envelope
 if TYPE_CHECKING:
     from alphacut.frame.methods.dual import DualProof
     from alphacut.frame.methods.proof import Proof
+    from alphacut.frame.threshold import Threshold
 
 # The proofs are imported where they are made: that takes .05 s, which a check of a case spares.
 LOG = logging.getLogger(__name__)
@@ -60,6 +61,8 @@ class Auto:
         magnitudes: Whether nothing is read off bounds below the peaks, which may be wide then.
         dual_first: Whether the dual bound is tried first in any case, which bounds peaks sooner
             than branch and bound, but no closer than asked.
+        thresholds: Limits of peaks where columns yield. With them the effort goes to the question
+            whether they hold, and not to the error.
 
     Raises:
         RefusedError: The tolerance is not positive.
@@ -72,6 +75,7 @@ class Auto:
     peaks: bool = False
     magnitudes: bool = False
     dual_first: bool = False
+    thresholds: tuple[Threshold, ...] = ()
 
     def __post_init__(self) -> None:
         if self.tolerance is not None:
@@ -148,12 +152,13 @@ class Auto:
         """Return the guaranteed envelope of a yielding storey, or that of a search of peaks.
 
         The search follows if the proof is refused, or if it leaves a gap of more than a tenth of a
-        peak. Then the guaranteed bounds stand outside its envelope.
+        peak. Then the guaranteed bounds stand outside its envelope. Where limits are asked about,
+        a gap has no meaning.
         """
         from alphacut.frame.methods.proof import Proof
 
         # At most 1000 sub-boxes take a minute or two (tuned: more hardly close gaps).
-        proof = Proof(None, self.tolerance, boxes=1000)
+        proof = Proof(None, self.tolerance, boxes=1000, thresholds=self.thresholds)
         attempts = _progress_of_attempts(progress)
         outer = None
         try:
@@ -161,7 +166,7 @@ class Auto:
         except UnprovedError as error:
             reason = str(error)
         else:
-            if proved.facts["gap_of_peaks"] <= WIDE:
+            if self.thresholds or proved.facts["gap_of_peaks"] <= WIDE:
                 return _noted(proved, f"{proof.name} succeeded")
             outer = proved.proved
             reason = "its gap is wider than the tolerance"

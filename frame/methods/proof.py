@@ -45,6 +45,7 @@ from alphacut.frame.modes.model_error import (
 )
 from alphacut.frame.response.duhamel import call_with_load
 from alphacut.frame.result import Envelope
+from alphacut.frame.threshold import Threshold
 from alphacut.frame.verification.rounding import rounding_margin
 
 LOG = logging.getLogger(__name__)
@@ -69,6 +70,8 @@ class Proof:
             for all bounds of a level. If it is reached, the gap is wider.
         parts: Largest number of sub-boxes for a peak, and of sub-boxes that may be refused.
         workers: Number of threads, which does not change the result; by default all cores.
+        thresholds: Limits of peaks where columns yield. With them the effort goes to the question
+            whether they hold, and not to the gap.
 
     Raises:
         RefusedError: A value is not positive.
@@ -80,6 +83,7 @@ class Proof:
     boxes: float = 4000
     parts: int = 16
     workers: int | None = None
+    thresholds: tuple[Threshold, ...] = ()
 
     def __post_init__(self) -> None:
         for key in ("gap", "tolerance", "boxes", "parts"):
@@ -103,7 +107,14 @@ class Proof:
             gap = flow.peak * YIELDING_GAP
             if stated := self.gap or self.tolerance:
                 gap = flow.scale * stated
-            return prove_yielding(flow, self.name, gap, budget=self.boxes, progress=progress)
+            return prove_yielding(
+                flow,
+                self.name,
+                gap,
+                budget=self.boxes,
+                thresholds=self.thresholds,
+                progress=progress,
+            )
         # Without a tolerance the gap is the tolerance, too.
         tolerance = flow.tolerance(self.tolerance or self.gap)
         return prove(replace(self, tolerance=tolerance), flow, progress, rounding_margin)

@@ -21,6 +21,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.yielding import MAX_IMBALANCE, YieldingFlow
 from alphacut.frame.methods.sampled import independent_points
 from alphacut.frame.result import Ends, Envelope
+from alphacut.frame.threshold import Threshold
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import corners
 
@@ -37,29 +38,6 @@ ROOM_BEFORE = 0.7
 """Fraction of the distance of what follows below the peak that may be spent so (tuned)."""
 SHOWN_RANGES = 3
 """Number of open sub-boxes that a message names."""
-
-
-@dataclass(frozen=True)
-class Threshold:
-    """A limit of an output's peak, as the question that a proof answers.
-
-    Args:
-        output: Name of the output.
-        value: Limit of its magnitude, of its largest value, or of that of its negative, in SI
-            units.
-        side: None of magnitudes, True of largest values, False of smallest ones, whose negatives
-            are limited.
-    """
-
-    output: str
-    value: float
-    side: bool | None = None
-
-    def peak(self, both: Array) -> Array:
-        """Return the peak that counts of largest values of (−output, output), shape (…, 2)."""
-        if self.side is None:
-            return np.asarray(both.max(axis=-1))
-        return both[..., int(self.side)]
 
 
 class OpenError(UnprovedError):
@@ -273,7 +251,7 @@ class _Search:
             middle = (box.low[axis] + box.high[axis]) / 2
             if box.high[axis] - box.low[axis] < MIN_WIDTH * self.width[axis]:
                 self.open.append(box)
-                break
+                continue
             for is_above in (False, True):
                 low = box.low.copy()
                 high = box.high.copy()
@@ -516,6 +494,7 @@ def _envelope(flow: UnitFlow, name: str, levels: list[_Search], influence: Array
             "gap_of_peaks": gap,
             "boxes": float(counts),
             "closed_fraction": closed,
+            "sought_to_limits": float(bool(levels[0].thresholds)),
             "motions_tested": sum(x.trajectories for x in levels),
         },
         notes=tuple(notes),

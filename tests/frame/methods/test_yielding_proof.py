@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.frame import StoreyFrame, envelope, peaks
+from alphacut.frame import Limit, StoreyFrame, decide, envelope, peaks
+from alphacut.frame.analyses.peaks import close_peaks
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.yielding import YieldingFlow
-from alphacut.frame.methods.yielding_proof import Threshold, prove_yielding
+from alphacut.frame.methods.yielding_proof import prove_yielding
+from alphacut.frame.threshold import Threshold
 from alphacut.fuzzy import Interval, Nature, Triangular
 from tests.frame.bounds.test_interpolated_box import isolated_building
 from tests.frame.bounds.test_single_storey import random_storey
@@ -91,3 +93,23 @@ def test_limits_of_an_isolated_building_are_answered_without_closing_gaps(rng):
     assert (found.lower[0] <= values).all()
     assert (values <= found.upper[0]).all()
     assert largest <= peaks(found)["q1"].proved[0] <= 1.5 * largest
+
+
+def test_a_decision_says_where_a_bound_was_sought_no_closer_than_its_limit(rng):
+    frame = isolated_building(rng, 1, outputs=("q1",))
+    k = frame.parameters["k1"]
+    inputs = {"k1": Interval(0.98 * k, 1.02 * k)}
+    motion = {"duration": 1.5, "step": 0.05, "alpha": [0.0]}
+    flow = YieldingFlow(frame, ("k1",), 1.5, 0.05)
+    _, reached = flow.values_and_peaks(np.linspace(0.98 * k, 1.02 * k, 21)[:, np.newaxis])
+    for value, verdict in (
+        (1.5 * reached.max(), "not exceeded"),
+        ((reached.min() + reached.max()) / 2, "can be exceeded"),
+        (0.7 * reached.min(), "exceeded"),
+    ):
+        limit = Limit("q1", float(value))
+        found = close_peaks(frame, inputs, ["q1"], limits=[limit], progress=False, **motion)
+        decision = decide(found, limit)
+        assert decision.limits["q1"].verdict == verdict
+        assert found["q1"].proved[0] >= reached.max()
+        assert "not sought closer" in str(decision.table())
