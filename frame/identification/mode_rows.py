@@ -103,10 +103,13 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
         re.fullmatch(r"mode|shape_std|q[1-9]\d*|frequency(_std)?", name) for name in columns
     )
     require(is_known, place, shown, allowed)
-    stated = [Stated(_hertz_of(place, x), x, place) for k, x in units.items() if k[:1] == "f" and x]
-    stated += _units_in_comments(path, head_row)
+    stated: list[Stated] = []
+    if not override:
+        of_head = [x for name, x in units.items() if name[:1] == "f" and x]
+        stated = [Stated(_hertz_of(place, x), x, place) for x in of_head]
+        stated += _units_in_comments(path, head_row)
     said = Stated(_hertz_of("frequency_unit", unit), unit) if unit else None
-    found = settled(path.name, "frequency_unit", stated, said, override=override)
+    found = settled(path.name, "frequency_unit", stated, said)
     cure = "write the unit into the header, frequency [Hz], or say frequency_unit"
     if found is None:
         raise RefusedError(place, f"{shown}, without a unit", "frequencies with a unit", cure)

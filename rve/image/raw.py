@@ -127,7 +127,7 @@ def read_head(path: Path, sides: Sequence[float], override: Collection[str] = ()
         "float": "f4", "double": "f8",
     }  # fmt: skip
     type_name = entries.value("elementtype", "type").lower()
-    type_name = type_name.removeprefix("met_").removeprefix("signed ")
+    type_name = re.sub("(?<=short) int", "", type_name).removeprefix("met_").removeprefix("signed ")
     kind = types.get(type_name.replace("unsigned ", "u").removesuffix("_t"))
     require(kind is not None, name, "a type that is not known", "whole numbers or floats")
 
@@ -172,6 +172,10 @@ def read_head(path: Path, sides: Sequence[float], override: Collection[str] = ()
         ordered = [unit_in_texts(texts)] * 3
     require_spacing(name, lengths, sides, ordered, texts=texts, override=override)
     endian = entries.value("binarydatabyteordermsb", "elementbyteordermsb", "endian")
+    # NRRD asks for it beside numbers of several bytes; MetaImage means the little one without it.
+    is_stated = bool(endian) or "elementtype" in entries.values or np.dtype(kind).itemsize == 1
+    allowed = "endian: little, or big"
+    require(is_stated, name, "without its order of bytes", allowed, "write it into the head")
     byte_order: Literal[">", "<"] = "<"
     if endian.lower() in ("big", *yes):
         byte_order = ">"

@@ -483,3 +483,13 @@ def test_lists_and_patterns_of_slices_are_read_from_the_folder_of_the_head(tmp_p
         (tmp_path / head).write_text(text.replace("s_", "../s_"))
         with refuses(head):
             voxels_of(tmp_path / head)
+
+
+def test_an_order_of_bytes_that_nrrd_does_not_state_is_asked_for(tmp_path, rng):
+    values = rng.integers(0, 60000, SHAPE).astype(">u2")
+    head = NRRD.format("unsigned short int", "raw")
+    (tmp_path / "a.nrrd").write_bytes(head.encode() + b"\n" + values.tobytes())
+    with refuses("a.nrrd"):
+        voxels_of(tmp_path / "a.nrrd")
+    (tmp_path / "a.nrrd").write_bytes(head.encode() + b"endian: big\n\n" + values.tobytes())
+    assert np.array_equal(voxels_of(tmp_path / "a.nrrd"), values)
