@@ -138,19 +138,15 @@ class _Table:
                 cells[k] = [word.strip() for word in words]
         n_columns = len(cells[first]) if cells else 0
         above = [k for k in plain if k < first][-2:]
-        heads: list[int] = above
-        columns = _columns_of([file.lines[k] for k in above], n_columns)
-        if not above:  # a comment names the columns if it begins with the time
-            heads = [k for k in lines if k < first][-1:]
-            texts_above = [re.sub(_COMMENT, "", file.lines[k]) for k in heads]
-            columns = _columns_of(texts_above, n_columns)
-            if not columns or not columns[0].is_time:
-                columns = []
-        has_units_line = len(heads) == 2 and _are_units(file.lines[heads[1]], n_columns)
-        heads = heads if has_units_line else heads[-1:]
-        if not columns:
-            return cls(file, texts, (), [_Column()] * n_columns, cells)
-        return cls(file, texts, tuple(heads), columns, cells)
+        is_plain = bool(above)
+        above = above or [k for k in lines if k < first][-1:]
+        named = [re.sub(f"^{_COMMENT}", "", file.lines[k]) for k in above]
+        columns, n_heads = _columns_of(named, n_columns)
+        # A comment names the columns if it begins with the time.
+        if not columns or not (is_plain or columns[0].is_time):
+            columns, n_heads = [_Column()] * n_columns, 0
+        heads = tuple(above[len(above) - n_heads :])
+        return cls(file, texts, heads, columns, cells)
 
     @property
     def start(self) -> int:
@@ -181,16 +177,16 @@ class _Table:
         value = value or f"{self.width} columns without a head"
         return self.file.refusal(self.start, value, EXPECTED_HEAD, cure)
 
-    def numbers(self, rows: Sequence[int]) -> Array:
-        """Return the numbers of rows, by their lines, shape (rows, columns).
+    def numbers(self, rows: Sequence[int], width: int = 0) -> Array:
+        """Return the numbers of rows, by their lines, shape (rows, width).
 
         Raises:
-            RefusedError: A cell is no finite number, or a row has another count of cells than the
-                first row of the table.
+            RefusedError: A cell is no finite number, or a row has another count of cells than
+                `width`, or than the first row of the table where it is 0.
         """
         for line in rows:
-            if len(self.rows[line]) != self.width or not _are_numbers(self.rows[line]):
-                raise _wrong_row(self, line)
+            if len(self.rows[line]) != (width or self.width) or not _are_numbers(self.rows[line]):
+                raise _wrong_row(self, line, expected=width)
         return np.array([[float(cell) for cell in self.rows[line]] for line in rows])
 
     def series(self, first: int = 0) -> Array:
@@ -205,16 +201,12 @@ class _Table:
         """
         *full, last = list(self.rows)[first:]
         width = len(self.rows[(full or [last])[0]])
-        for line in [*full, last]:
-            count = len(self.rows[line])
-            is_short = line == last and count < width
-            if not _are_numbers(self.rows[line]) or (count != width and not is_short):
-                raise _wrong_row(self, line, expected=width)
-        series = np.array([float(cell) for line in [*full, last] for cell in self.rows[line]])
+        numbers = self.numbers(full, width)
+        rest = self.numbers([last], min(len(self.rows[last]), width))
+        series = np.append(numbers.ravel(), rest)
         if width > 1 and len(full) > 1:
             # Neighbours in time differ little. In one series these are neighbours in a row, and
             # numbers one below another are as many samples apart as there are columns.
-            numbers = series[: len(full) * width].reshape(-1, width)
             change_along_rows = np.abs(np.diff(numbers.ravel())).mean()
             if np.abs(np.diff(numbers, axis=0)).mean() < change_along_rows:
                 value = f"{width} columns, each smoother than the rows"
@@ -261,33 +253,28 @@ def _cells_of_head(text: str, count: int) -> list[str]:
     return []
 
 
-def _are_units(text: str, count: int) -> bool:
-    """Return whether a line has known units alone, as many as there are columns."""
-    units = [cell.strip(' "[]()') for cell in _cells_of_head(text, count)]
-    return bool(units) and all(
-        acceleration_factor(x) or seconds_of(x) or other_quantity(x) for x in units
-    )
-
-
-def _columns_of(lines: Sequence[str], count: int) -> list[_Column]:
+def _columns_of(lines: Sequence[str], count: int) -> tuple[list[_Column], int]:
     """Return name and unit of each column from the last lines above the numbers, at most two.
 
     Loggers write the names of columns in one line and their units, with or without brackets, in the
-    next: "time,acc" and "s,g". The result is empty where the last line has another number of cells
+    next: "time,acc" and "s,g". There are no columns where the last line has another number of cells
     than there are columns, or is a title of two words.
+
+    Returns:
+        The columns, and how many of the lines name them.
     """
     cells = _cells_of_head(lines[-1] if lines else "", count)
     if not cells:
-        return []
-    if _are_units(lines[-1], count):
+        return [], 0
+    units = [cell.strip(' "[]()') for cell in cells]
+    if all(acceleration_factor(x) or seconds_of(x) or other_quantity(x) for x in units):
         names = _cells_of_head(lines[0], count) if len(lines) > 1 else []
-        names = names or [""] * count
-        units = [cell.strip(' "[]()') for cell in cells]
-        return [_Column(n.strip(' "').lower(), u) for n, u in zip(names, units, strict=True)]
+        pairs = zip(names or [""] * count, units, strict=True)
+        return [_Column(name.strip(' "').lower(), unit) for name, unit in pairs], len(lines)
     columns = [_Column.of(cell) for cell in cells]
-    is_known = columns[0].is_time or any(x.unit for x in columns) or count > 2
-    is_known = is_known or bool(re.search("[,;\t]", lines[-1]))
-    return columns if is_known else []
+    is_parted = count > 2 or re.search("[,;\t]", lines[-1]) is not None
+    is_known = is_parted or columns[0].is_time or any(x.unit for x in columns)
+    return (columns, 1) if is_known else ([], 0)
 
 
 def _are_numbers(cells: Sequence[str]) -> bool:
@@ -342,13 +329,9 @@ def is_table(file: TextFile, *, is_described: bool = False) -> bool:
     is_row = any(
         all(NUMBER.fullmatch(x) or re.fullmatch(_TOUCHING, x) for x in cells) for cells in last_row
     )
-    return is_row and (is_described or not plain or len(last_row[0]) < 3 or _is_stated(table))
-
-
-def _is_stated(table: _Table) -> bool:
-    """Return whether the lines of text tell a unit or a step."""
-    found = TextStatements.of(table.file, table.texts)
-    return bool(found.units or found.peak_units or found.steps)
+    found = TextStatements.of(file, table.texts)
+    is_stated = bool(found.units or found.peak_units or found.steps)
+    return is_row and (is_described or not plain or len(last_row[0]) < 3 or is_stated)
 
 
 def read_table(
@@ -413,10 +396,9 @@ def read_table(
             name = f"{index + 1} {table.columns[index].name}".strip()
     column = table.columns[index]
     own_unit = _unit_of(table, column, found, unit=unit, override=override)
-    if known_step is None and not has_times:
-        raise table.refusal("say records.step, the time between the numbers, as in s or ms")
-    if own_unit is None:
-        raise table.refusal("say records.unit: no line states the unit, or write it into the head")
+    if own_unit is None or (known_step is None and not has_times):
+        key = "unit" if own_unit is None else "step"
+        raise table.refusal(f"say records.{key}: no line states the {key}")
     remarks = [own_unit.remark]
     if is_series and not channel:
         samples = table.series(int(is_head))
