@@ -64,7 +64,7 @@ lint:
 	$(IN) mypy --strict alphacut
 
 charts:
-	$(IN) python -m benchmarks.rve.charts
+	$(IN) python -m benchmarks.rve.one_shape
 	$(IN) python -m benchmarks.rve.voxels --chart
 	$(IN) python -m benchmarks.frame.integrators
 	$(IN) python -m benchmarks.frame.envelopes

@@ -31,6 +31,14 @@ from benchmarks.synthetic_record import SyntheticRecord, write_suite
 RESULTS = Path(__file__).parent / "results"
 MESH_SIZES = (0.15, 0.11, 0.08, 0.055, 0.04)  # 34,000 to 385,000 unknowns
 STOREYS, INPUTS, RECORDS, WORKERS = (3, 6, 12, 24), (2, 4, 8, 12, 17), (1, 4, 11, 44), (1, 2)
+OF = {
+    "unknowns": "of the paper's cell",
+    "storeys": "of a frame, five inputs",
+    "inputs": "of eight storeys",
+    "records": "of a suite, three inputs",
+    "workers": "for eleven records",
+}
+"""What each size is of, for the axes."""
 MIN_POINTS = 3
 """Fewest points that an exponent is fitted to."""
 SUITE = """
@@ -114,17 +122,19 @@ def draw(rows: Sequence[Row]) -> None:
         size, seconds = (np.array([row[key] for row in line], float) for key in ("size", "seconds"))
         if len(size) >= MIN_POINTS:
             power = float(np.polyfit(np.log(size), np.log(seconds), 1)[0])
-            words = f"seconds ~ size^{power:.2f}"
+            words = f"time ~ {kind}$^{{{power:.2f}}}$"
         else:
             words = f"{seconds[-1] / seconds[0]:.2f} of the time of {size[0]:g}"
         print(f"{kind}: {words}")
         axes.loglog(size, seconds, "o-")
-        axes.set(xlabel=kind, title=words)
+        axes.set(xlabel=f"{kind} {OF[kind]}", title=words)
         axes.set_xticks(size, [f"{x:,.0f}" for x in size], rotation=30)
         axes.set_yticks(seconds, [f"{x:.2g}" for x in seconds])
         axes.minorticks_off()
         axes.grid(alpha=0.25)
-    panels[0].set_ylabel("seconds")
+    panels[0].set_ylabel("processor time in s")
+    panels[-1].set_ylabel("time of the clock in s")
+    figure.suptitle("Time of a first computation over its size")
     for suffix in (".svg", ".png"):
         figure.savefig(RESULTS / f"costs{suffix}", dpi=160)
 

@@ -20,7 +20,7 @@ OF_RUNS = {
 }
 """Case and figure of each picture that a run of a case draws."""
 COMMANDS = {
-    "benchmarks/results/cell_accuracy.png": "python -m benchmarks.rve.charts",
+    "benchmarks/results/one_shape.png": "python -m benchmarks.rve.one_shape",
     "benchmarks/results/costs.png": "python -m benchmarks.costs",
     "benchmarks/results/frame_envelopes.png": "python -m benchmarks.frame.envelopes",
     "benchmarks/results/voxels.png": "python -m benchmarks.rve.voxels --chart",

@@ -16,7 +16,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 from alphacut.base.errors import FailedError
@@ -129,17 +128,8 @@ def covered(outer: Envelope, inner: Envelope) -> bool:
     return bool(above and (outer.lower <= inner.inner.lower + slack).all())
 
 
-def draw(rows: list[dict[str, Any]], path: Path) -> None:
-    """Time over the number of inputs."""
-    figure, axes = plt.subplots(figsize=(5, 3.5), layout="constrained")
-    done = [row for row in rows if "gap" in row]
-    axes.plot([row["inputs"] for row in done], [row["processor seconds"] for row in done], "o-")
-    axes.set(xlabel="fuzzy inputs", ylabel="processor time in s", ylim=(0, None))
-    figure.savefig(path)
-
-
 def main() -> None:
-    """Write many_inputs.csv and its chart, and few_inputs.csv."""
+    """Write many_inputs.csv, or few_inputs.csv."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--step", type=float, default=0.05, help="between nodes, in s")
     parser.add_argument("--width", type=float, default=0.04, help="half supports, as shares")
@@ -151,8 +141,6 @@ def main() -> None:
         rows.append(row)
         print({k: f"{x:.3g}" if isinstance(x, float) else x for k, x in row.items()}, flush=True)
     write(rows, RESULTS / ("few_inputs.csv" if both else "many_inputs.csv"))
-    if not both:
-        draw(rows, RESULTS / "many_inputs.png")
 
 
 if __name__ == "__main__":

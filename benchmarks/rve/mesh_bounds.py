@@ -20,6 +20,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 
@@ -53,7 +54,9 @@ class Row:
         prisms: Number of prisms of the mesh as it is.
         contrast: Modulus of the particles over that of the matrix.
         width: Relative distance of the bounds of the mesh as it is.
+        seconds: Processor time of these bounds.
         ratio: This distance over that of the refined mesh.
+        refined_seconds: Processor time of the bounds of the refined mesh.
         inside: Whether the extrapolated stiffness lies inside both pairs of bounds.
         work: Work of the stresses in random displacements over that of their magnitudes.
     """
@@ -64,7 +67,9 @@ class Row:
     prisms: int
     contrast: float
     width: float
+    seconds: float
     ratio: float
+    refined_seconds: float
     inside: bool
     work: float
 
@@ -228,7 +233,11 @@ def judged(number: int, seed: int, folder: Path) -> Row:
     models = model, replace(model, refine=True), MeshModel(finer, refine=True)
     solutions = [np.array(one.solve(LAW, phases)[0].stiffness, float) for one in models]
     limit = extrapolated(np.array([energies(stiffness) for stiffness in solutions]))
-    coarse, fine = [one.bounds(LAW, phases) for one in models[:2]]
+    timed = []
+    for one in models[:2]:
+        started = process_time()
+        timed.append((one.bounds(LAW, phases), process_time() - started))
+    (coarse, seconds), (fine, refined_seconds) = timed
     return Row(
         particles=len(discs),
         corners=corners,
@@ -236,7 +245,9 @@ def judged(number: int, seed: int, folder: Path) -> Row:
         prisms=len(grid.cells),
         contrast=contrast,
         width=coarse.width,
+        seconds=seconds,
         ratio=coarse.width / fine.width,
+        refined_seconds=refined_seconds,
         inside=holds(coarse, limit) and holds(fine, limit),
         work=work_of_stresses(model, phases, rng),
     )
@@ -247,6 +258,33 @@ def table(count: int, seed: int) -> Iterator[Row]:
     with tempfile.TemporaryDirectory() as folder:
         for number in range(count):
             yield judged(number, seed, Path(folder))
+
+
+def draw(found: Sequence[Row], path: Path) -> None:
+    """Draw the distance of the bounds over time, a line from each mesh to its refined one."""
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(figsize=(7.5, 4.5), layout="constrained")
+    for row in found:
+        label = "particles with corners" if row.corners else "round particles"
+        axes.loglog(
+            (row.seconds, row.refined_seconds),
+            (row.width, row.width / row.ratio),
+            "o-",
+            color="C1" if row.corners else "C0",
+            label=label,
+            ms=4,
+            alpha=0.7,
+        )
+    handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    axes.legend(handles.values(), handles.keys(), frameon=False)
+    axes.set(
+        xlabel="processor time of both bounds in s",
+        ylabel="relative distance of the bounds",
+        title=f"{len(found)} random meshes of one's own, as they are and refined once",
+    )
+    axes.grid(alpha=0.25)
+    figure.savefig(path, dpi=150)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -272,6 +310,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rows.write(
         [{"seed": options.seed, **asdict(row)} for row in found], options.out / "mesh_bounds.csv"
     )
+    draw(found, options.out / "mesh_bounds.png")
     for corners in (False, True):
         own = [row.ratio for row in found if row.corners == corners]
         if own:

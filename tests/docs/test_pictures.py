@@ -40,10 +40,10 @@ def column(name, key):
         return list(dict.fromkeys(row[key] for row in csv.DictReader(file)))
 
 
-def test_names_in_charts_are_those_of_the_code():
+def test_names_in_charts_are_those_of_the_code(tmp_path):
     pytest.importorskip("alphacut.rve.fenicsx")
     from benchmarks.frame.envelopes import METHODS
-    from benchmarks.rve.charts import families
+    from benchmarks.rve import one_shape
 
-    assert column("cell_accuracy.csv", "family") == list(families())
+    assert column("one_shape.csv", "way") == list(one_shape.ways(tmp_path))
     assert column("frame_envelopes.csv", "method") == [repr(method) for method in METHODS]
