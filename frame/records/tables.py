@@ -382,7 +382,10 @@ def read_table(
     else:
         is_head = False
         _require_cell_of_each_head(table)
-    has_times = not is_head and (table.has_times or (table.width == 2 and step is None))
+    are_pairs = table.width == 2 and step is None
+    if are_pairs and acceleration_factor(table.columns[0].unit) is not None:
+        are_pairs = table.columns[1].is_time  # else two components
+    has_times = not is_head and (table.has_times or are_pairs)
     known_step = None
     if not has_times:
         known_step = settled(place, "step", found.steps, said_step, override=override)
@@ -488,10 +491,17 @@ def _unit_of(
     of_heads = TextStatements.of(file, table.heads)
     if not own:
         found.units += of_heads.units
-    named = named_quantity(column.name)
-    by_unit = other_quantity(column.unit)
-    if by_unit and column.unit:
-        by_unit += f" by its unit {column.unit}"
+    label = column
+    plain = [file.lines[k] for k in table.texts if not re.match(_COMMENT, file.lines[k])]
+    if table.width == 1 and plain and not found.units:
+        label = _Column.of(plain[-1])
+        is_unit = "[" in plain[-1] or "/" in label.unit
+        if label.is_time or not is_unit or acceleration_factor(label.unit) is not None:
+            label = _Column(label.name)
+    named = named_quantity(label.name)
+    by_unit = other_quantity(label.unit)
+    if by_unit:
+        by_unit += f" by its unit {label.unit}"
     elsewhere = ""
     line = table.start
     if not own and not found.units and not re.search(r"(?:\b|_)acc", column.name):
@@ -506,8 +516,8 @@ def _unit_of(
         raise file.refusal(line, table.file.lines[line], EXPECTED_HEAD, cure)
     if "unit" in override and unit:
         own = own[:1]
-    elif column.unit and factor is None:
-        raise table.refusal(f"{column.unit} is no unit of accelerations: mend the head")
+    elif label.unit and acceleration_factor(label.unit) is None and not found.units:
+        raise table.refusal(f"{label.unit} is no unit of accelerations: mend the head")
     elif factors := [*found.factors, *of_heads.factors]:
         cure = 'multiply the numbers by it, or say unit and override = ["unit"]'
         text = file.lines[factors[0]].strip()
