@@ -127,3 +127,22 @@ stiffness = [["E", "job_STIF1.mtx"]]
     assert [("not named" in words) for words in told.values()] == [False, True]
     line = "warning: 3 unknowns of the files are not named, and so are held: 2.2, 2.6, 3.6\n"
     assert line in told['["4.2", "4.6", "3.2"]']
+
+
+def test_two_exports_are_enough_where_the_case_says_that_they_are_affine(case, capsys):
+    text = case.read_text()
+    first = text.index("stiffness = [")
+    listed = text[first : text.index("]\n", first)]
+    ends = [f'{{ file = "k{n}.mtx", E = "{POINTS[n][0]}" }},\n' for n in (0, 1)]
+    text = text.replace(listed, "stiffness = [\n" + "".join(ends))
+    text = text.replace('k = "3.7e6 ± 20 %"\n', "").replace('["E", "k"]', '["E"]')
+    case.write_text(text)
+    assert main(["check", str(case)]) == 2
+    told = capsys.readouterr().err
+    assert "affine = true" in told
+    case.write_text(text.replace("[matrices]", "[matrices]\naffine = true"))
+    assert main(["check", str(case)]) == 0
+    structure = load(str(case)).content.structure.model
+    for modulus in (210e9, 500e9, 1.9e11):
+        total = sum((modulus if f == "E" else 1.0) * k for f, k in structure.stiffness)
+        assert total == pytest.approx(beam(modulus, 3.7e6), rel=1e-6, abs=1.0)

@@ -55,3 +55,16 @@ def test_units_of_words_signs_and_powers_are_read(text, si, value):
             parse_fuzzy(text, si)
     else:
         assert parse_fuzzy(text, si).nominal == pytest.approx(value, rel=1e-15)
+
+
+@pytest.mark.parametrize("blocks", [1, 12, 40])
+def test_a_run_under_a_limit_of_file_sizes_is_one_line(tmp_path, blocks):
+    case = written(tmp_path)
+    command = f"ulimit -f {blocks}; exec {sys.executable} -m alphacut run {case} --out out --quiet"
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    ended = subprocess.run(
+        ["sh", "-c", command], cwd=tmp_path, env=environment, capture_output=True, text=True
+    )
+    assert ended.returncode == 1
+    assert ended.stderr.endswith("File too large\n")
+    assert len(ended.stderr.splitlines()) == 1, ended.stderr

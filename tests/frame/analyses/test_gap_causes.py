@@ -112,6 +112,40 @@ def test_a_wide_gap_is_told_with_its_cause(step):
             assert "narrow" in peak.warning
 
 
+WIDE = """
+title = "Dashpots and wide inputs"
+stages = ["envelope"]
+shares = false
+[frame]
+masses = ["10 t", "10 t"]
+stiffness = ["4 MN/m ± 40 %", "3 MN/m ± 40 %"]
+dampers = ["30 kN s/m", "0 kN s/m"]
+damper_placement = "storey"
+displacements = ["10 mm", "-10 mm"]
+outputs = ["q2"]
+[envelope]
+fuzzy = ["k"]
+alpha = [0]
+duration = "6 s"
+step = "0.2 s"
+"""
+
+
+def test_a_wide_gap_is_a_warning_on_terminal_and_page_and_in_the_answer(tmp_path, capsys):
+    case, out = tmp_path / "case.toml", tmp_path / "out"
+    case.write_text(WIDE)
+    assert main(["run", str(case), "--no-figures", "--out", str(out)]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    peak = summary_of(out)["envelopes"]["all"]["peak"]["q2"]
+    assert peak["upper"][0] > 1.1 * peak["reached"][0]
+    assert peak["nature"] == "guaranteed"
+    assert peak["cause"]
+    assert "Warning: q2: " in told
+    assert f"of its bound is above what is attained: {peak['cause']}" in told
+    assert main(["report", str(out)]) == 0
+    assert "of its bound is above what is attained" in (out / "report.html").read_text()
+
+
 def test_estimates_that_no_proof_was_tried_for_have_no_warning():
     band = envelope(
         frame(q0=[0.01, 0.0]), {"k1": Interval(3.9e6, 4.1e6)}, Sampled(4),
