@@ -803,15 +803,18 @@ class _Sweep:
         # The plastic drift is off by the errors of the drift and of the slider, and by how far
         # defects move this.
         plastic = drift + 2 * most / np.sqrt(model.slider_ends[0])
-        # On each part of an element's time: may the slider's force lie beyond ∓ F / 2?
-        force = found.slider_force
-        control = np.einsum("ik,ekf->eif", bernstein_matrix(found.terms - 1, SIDE_PARTS), force)
-        middle, radius = (x.reshape(len(most), SIDE_PARTS, -1) for x in ranges(model, control))
-        half = model.force_ends[0] / 2 - missed.level[:, np.newaxis]
+        # Bounds of the slider's force on parts of an element's time: may it lie beyond ∓ F / 2?
+        matrix = bernstein_matrix(found.terms - 1, SIDE_PARTS)
+        control = np.einsum("ik,ekf->eif", matrix, found.slider_force)
+        middle, radius = ranges(model, control)
+        shape = (len(most), SIDE_PARTS, found.terms)
+        low = (middle - radius).reshape(shape).min(axis=2) - missed.level[:, np.newaxis]
+        high = (middle + radius).reshape(shape).max(axis=2) + missed.level[:, np.newaxis]
+        half = model.force_ends[0] / 2
         is_elastic = (found.phase == 0)[:, np.newaxis]
         phase = found.phase[:, np.newaxis]
-        may_be_low = np.where(is_elastic, (middle - radius).min(axis=2) <= -half, phase < 0)
-        may_be_high = np.where(is_elastic, (middle + radius).max(axis=2) >= half, phase > 0)
+        may_be_low = np.where(is_elastic, low <= -half, phase < 0)
+        may_be_high = np.where(is_elastic, high >= half, phase > 0)
         if (may_be_low & may_be_high).any():
             return np.full(len(most), np.inf)
         side = may_be_high.astype(int) - may_be_low
@@ -824,8 +827,7 @@ class _Sweep:
         path = self.path + np.cumsum(switched + missed.path)
         self.path = float(path[-1])
         # Up to here no motion has yielded if none can have come to the yield force.
-        force_bound = (np.abs(middle) + radius).max(axis=(1, 2)) + missed.level
-        force_bound += most * np.sqrt(model.slider_ends[1])
+        force_bound = np.maximum(-low, high).max(axis=1) + most * np.sqrt(model.slider_ends[1])
         yields = (found.phase != 0) | (force_bound >= model.force_ends[0])
         has_yielded = np.logical_or.accumulate(np.append(self.has_yielded, yields))[1:]
         self.has_yielded = bool(has_yielded[-1])

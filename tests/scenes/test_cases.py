@@ -26,6 +26,7 @@ QUICK = {  # case: changes that make it quick, and the results that it then has
     "paper": (("stages=['modulus']", *SERIES, *LEVELS), {"modulus"}),
     "paper-3d": (("stages=['modulus']", *LEVELS), {"modulus"}),
     "building": (SHORT_BUILDING, {"modulus"}),
+    "isolation": (("envelope.duration=3 s",), {"decision"}),
 }
 WHOLE = (
     "paper",
@@ -36,6 +37,7 @@ WHOLE = (
     "concrete",
     "tomogram",
     "yielding",
+    "isolation",
 )
 UNDECLARED = 0.02  # share of the peak by which attained bounds without an error may differ
 STRENGTH = {"inner": 0, "attained": 0, "searched": 0, "estimated": 1, "guaranteed": 2}
