@@ -42,6 +42,9 @@ CELL_GRACE = 8
 MIN_CELL_PROGRESS = 0.5
 """Fraction of an even fall of the gap of a node, to the gap that suffices, below which its effort
 ends. A larger number ends it earlier."""
+EXPECTED_CUBIC = 0.25
+"""Sum of the cubic parts over the sum of their magnitudes that is expected: they partly cancel.
+With 1 they are not expected to cancel at all."""
 
 PRUNING_CELLS, PRUNING_STEPS = 24, 40
 """Largest numbers of cells of a bound over an end of the range of an input, and of evaluations of

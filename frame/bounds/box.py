@@ -15,9 +15,9 @@ from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.modes.damped_models import damped_models
+from alphacut.frame.modes.classical_modes import classical_modes
+from alphacut.frame.modes.damped_modes import damped_modes
 from alphacut.frame.modes.intervening import Excitation
-from alphacut.frame.modes.models import ModalResponseModels
 from alphacut.frame.modes.point_modes import PointModes
 from alphacut.frame.modes.structure import (
     ClassicalStructure,
@@ -104,8 +104,8 @@ class Box:
                 derivative_orders=structure.derivative_orders[outputs],
             )
             excitation = Excitation(self.time[nodes], sources(self.system, structure))
-            models = ModalResponseModels.from_structure(structure, excitation, truncation_tolerance)
-            return LevelModels.from_models(models, structure.derivative_orders, excitation)
+            modes = classical_modes(structure, excitation, truncation_tolerance)
+            return LevelModels.from_modes(modes)
         except UnprovedError as refusal:
             if refusal.along is not None:  # counts the active inputs; made to count all
                 refusal.along = int(self.active[refusal.along])
@@ -130,10 +130,8 @@ class Box:
         flow = LinearFlow(self.system, names, duration=duration, step=step, integrator=Exact())
         if model_tolerance is None:
             model_tolerance = np.full(len(flow.outputs), np.inf)
-        found = damped_models(flow, cuts, fixed, model_tolerance).at(nodes, outputs)
-        orders = np.zeros(found.models.coupling.shape[1], int)
-        excitation = Excitation(self.time[nodes], found.sources)
-        return LevelModels.from_models(found.models, orders, excitation)
+        modes = damped_modes(flow, cuts, fixed, model_tolerance)
+        return LevelModels.from_modes(modes.at(nodes, outputs))
 
     def exact_values(self, unit: Array, node: Ints, output: Ints) -> Array:
         """Return one output at one time node for each of S points, exact but for rounding, (S,).

@@ -53,7 +53,9 @@ class DualFunctionData(NamedTuple):
     linear: Array  # linear coefficients of the scaled variables, (Z, L)
     quadratic: Array  # quadratic coefficients, (Z, L (L + 1)/2)
     cubic: Array  # cubic coefficients, (Z, monomials)
-    remainder: Array  # bounds of what the models leave out, (Z,)
+    # what the sum of the cubic terms is expected to reach for a multiplier of 1, (Z,)
+    expected_cubic: Array
+    remainder: Array  # bounds of what the models leave out, with `expected_cubic`, (Z,)
     # midpoints and radii of the responses of truncated modes, in turn, (2 sources, T); (0, 1) if
     # there are none
     truncated_response: Array
@@ -67,7 +69,7 @@ def data_without_modes() -> DualFunctionData:
     """Return data of empty arrays, with which a kernel can be called before there are models."""
     dimensions = dict.fromkeys(DualFunctionData._fields, 2)
     dimensions["table"] = 4
-    for name in ("grid_points", "remainder", "multiplier_spacing"):
+    for name in ("grid_points", "expected_cubic", "remainder", "multiplier_spacing"):
         dimensions[name] = 1
     return DualFunctionData(**{name: np.zeros((0,) * count) for name, count in dimensions.items()})
 
@@ -332,18 +334,23 @@ def maximand(
 
 @loops
 def cubic_bound(mu: Array, data: DualFunctionData) -> float:
-    """Bound Σ_z μ_z (cubic terms of z) over the box, which D(μ) leaves out.
+    """Bound Σ_z μ_z (cubic terms of z) over the box, less the allowance for it in D(μ).
 
-    Each variable z of the modes is a polynomial of the inputs in [−1, 1].
+    Each variable z of the modes is a polynomial of the inputs in [−1, 1]. D(μ) contains the
+    allowance Σ |μ_z| `expected_cubic[z]` for the cubic terms, which may be too small or too large.
+    The result is to be added to D(μ), also if it is negative.
 
     Args:
         mu: Multipliers, shape (Z,).
-        data: `cubic`, the cubic coefficients of each variable, shape (Z, monomials).
+        data: `cubic`, the cubic coefficients of each variable, shape (Z, monomials), and
+            `expected_cubic`, shape (Z,).
     """
     total = np.zeros(data.cubic.shape[1])
+    expected = 0.0
     for z in range(len(mu)):
         add(total, mu[z], data.cubic[z])
-    return np.abs(total).sum()
+        expected += abs(mu[z]) * data.expected_cubic[z]
+    return np.abs(total).sum() - expected
 
 
 @compiled

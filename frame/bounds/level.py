@@ -19,8 +19,8 @@ from alphacut.frame.bounds.dual_function import DualFunctionData, require_in_ran
 from alphacut.frame.bounds.node_bounds import Effort, bound_nodes
 from alphacut.frame.calculus.monomials import monomials
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
-from alphacut.frame.modes.intervening import Excitation, Oscillator
-from alphacut.frame.modes.models import ModalResponseModels
+from alphacut.frame.modes.intervening import Oscillator
+from alphacut.frame.modes.modes import Modes
 from alphacut.frame.response.oscillators import (
     Grid,
     ModalResponses,
@@ -40,14 +40,14 @@ class ResponseTable(NamedTuple):
 
 
 def response_tables(
-    grids: Sequence[Grid], excitation: Excitation, orders: Sequence[int]
+    grids: Sequence[Grid], modes: Modes, orders: Sequence[int]
 ) -> dict[int, ResponseTable]:
     """Return tables of the responses of K oscillators on grids, by the order of the derivative.
 
     Args:
         grids: Grid over the frequency ω and the quotient q = decay/ω of each oscillator, at least
             one; all have the same numbers of points.
-        excitation: T time nodes and the sources, at least one.
+        modes: T time nodes and the sources, at least one.
         orders: Derivatives by time of the displacements (0, 1, 2) that outputs take, each once.
 
     Returns:
@@ -60,19 +60,19 @@ def response_tables(
         UnprovedError: A response is not finite or above 1e100, or an oscillator turns too far
             within a sample interval of a load.
     """
-    time, sources = excitation
+    time = modes.time
     by_order: dict[int, list[list[ModalResponses]]] = {order: [] for order in orders}
     deviations: dict[int, list[list[Array]]] = {order: [] for order in orders}
     for grid in grids:
         oscillators = Oscillators(grid, time, orders)
-        for order, modes in by_order.items():
-            modes.append([oscillators.responses(source, order) for source in sources])
-            of_mode = [oscillators.line_deviation(source, order) for source in sources]
+        for order, of_order in by_order.items():
+            of_order.append([oscillators.responses(x, order) for x in modes.sources])
+            of_mode = [oscillators.line_deviation(x, order) for x in modes.sources]
             deviations[order].append(of_mode)
     tables = {}
-    for order, modes in by_order.items():
-        value = np.array([[x.value.reshape(len(time), -1) for x in mode] for mode in modes])
-        error = np.array([[x.error for x in mode] for mode in modes])
+    for order, of_order in by_order.items():
+        value = np.array([[x.value.reshape(len(time), -1) for x in mode] for mode in of_order])
+        error = np.array([[x.error for x in mode] for mode in of_order])
         max_magnitude = np.abs(value).max(axis=-1)
         require_in_range({"table": max_magnitude})
         tables[order] = ResponseTable(
@@ -113,37 +113,27 @@ def _table_points(oscillators: Sequence[Oscillator], duration: float) -> tuple[i
 class LevelModels:
     """Models of the response over the box of one level, and response tables."""
 
-    models: ModalResponseModels  # the response over the box
-    orders: Ints  # derivative of the responses of oscillators that each output takes, (m,)
+    modes: Modes  # the response over the box
     grids: list[Grid]  # points of the tables of each oscillator
     tables: dict[int, ResponseTable]  # responses of the oscillators, by order of derivative
-    excitation: Excitation  # time nodes and sources
 
     def on_subbox(self, low: Array, high: Array) -> LevelModels:
         """Return the models over the sub-box low ≤ u ≤ high, with the same response tables."""
-        return replace(self, models=self.models.on_subbox(low, high))
+        return replace(self, modes=self.modes.on_subbox(low, high))
 
     @classmethod
-    def from_models(
-        cls, models: ModalResponseModels, orders: Ints, excitation: Excitation
-    ) -> LevelModels:
-        """Return models of a response over a box with tables of the responses of its oscillators.
-
-        Args:
-            models: At least one oscillator, and what couples them.
-            orders: Derivative by time of the oscillators' responses that each output takes, (m,).
-            excitation: T ≥ 1 rising time nodes t ≥ 0, and the sources, at least one.
+    def from_modes(cls, modes: Modes) -> LevelModels:
+        """Return modes over a box, at least one, with tables of the responses of their oscillators.
 
         Raises:
             UnprovedError: A response is out of the range of the tables.
         """
-        points = _table_points(models.oscillators, float(excitation.time[-1]))
+        points = _table_points(modes.oscillators, float(modes.time[-1]))
         grids = [
-            grid_over(mode.omega_range, mode.quotient_range, points) for mode in models.oscillators
+            grid_over(mode.omega_range, mode.quotient_range, points) for mode in modes.oscillators
         ]
-        distinct_orders = [int(order) for order in np.unique(orders)]
-        tables = response_tables(grids, excitation, distinct_orders)
-        return cls(models, orders, grids, tables, excitation)
+        distinct_orders = [int(order) for order in np.unique(modes.orders)]
+        return cls(modes, grids, response_tables(grids, modes, distinct_orders))
 
     def interpolation_error(self) -> Array:
         """Bound the distance of outputs from a straight line within each time step, shape (T, m).
@@ -151,14 +141,8 @@ class LevelModels:
         Row j belongs to the step that ends at node j. All is in the units of the outputs and holds
         for every input of the box.
         """
-        error: Array = self.models.interpolation_error + sum(
-            x.interpolation_error for x in self.models.truncated
-        )
-        for o, order in enumerate(self.orders):
-            of_modes = self.tables[int(order)].interpolation_error
-            for mode, of_mode in zip(self.models.oscillators, of_modes, strict=True):
-                error[:, o] += mode.participation.magnitude()[:, o] @ of_mode
-        return error
+        deviations = {order: table.interpolation_error for order, table in self.tables.items()}
+        return self.modes.with_deviations(deviations)
 
 
 @dataclass(eq=False)
@@ -212,16 +196,14 @@ class OutputBounds:
         """−1 or 1."""
         return (-1.0, 1.0)[self.index[1]]
 
-    def nodes_above_peak(self, nodes: Ints) -> Ints:
-        """Return those of some nodes whose bound exceeds attained value + wanted gap."""
-        return nodes[self.upper[nodes] > self.attained + self.wanted_gap]
-
     def open_nodes(self, slack_below_peak: float) -> Ints:
-        """Return nodes (J,) whose bound exceeds the model value by too much; see `Effort`."""
+        """Return nodes (J,) whose bound exceeds the model value by too much; see `Effort`.
+
+        With 1 these are the nodes whose bound exceeds the peak by more than the wanted gap.
+        """
         peak = max(self.model_value.max(), self.attained)
-        below_peak = np.maximum(peak - self.model_value, 0.0)
-        sufficient = self.wanted_gap + slack_below_peak * below_peak
-        return np.flatnonzero(self.upper - self.model_value > sufficient)
+        sufficient = (1 - slack_below_peak) * self.model_value + slack_below_peak * peak
+        return np.flatnonzero(self.upper - self.wanted_gap > sufficient)
 
     def effort(
         self, cells: int, steps: int, slack_below_peak: float = 0.0, remainder_multiple: float = 0.0
@@ -338,8 +320,8 @@ def _dual_function_data(
     Returns:
         `DualFunctionData`, and the constants (2, T) of `OutputBounds.constant`.
     """
-    modes = level.models.oscillators
-    table = level.tables[int(level.orders[output])]
+    modes = level.modes.oscillators
+    table = level.tables[int(level.modes.orders[output])]
     variables = concatenate(
         [
             x
@@ -352,6 +334,7 @@ def _dual_function_data(
     radius = np.maximum(variables.deviation(), 1e-9 * np.abs(variables.value))
     radius = np.maximum(radius, 1e-30)
     scaled = _scaled(variables, radius)
+    expected_cubic = numbers.EXPECTED_CUBIC * np.asarray(np.abs(scaled.cubic).sum(axis=1))
     midpoints = variables.value.reshape(len(modes), -1)
     radii = radius.reshape(len(modes), -1)
     grids = level.grids
@@ -378,7 +361,8 @@ def _dual_function_data(
         linear=scaled.linear,
         quadratic=scaled.quadratic,
         cubic=scaled.cubic,
-        remainder=scaled.remainder,
+        expected_cubic=expected_cubic,
+        remainder=scaled.remainder + expected_cubic,
         truncated_response=truncated.response,
         truncated_linear=truncated.linear,
         truncated_quadratic=truncated.quadratic,
@@ -417,21 +401,21 @@ def _truncated_terms(level: LevelModels, output: int, side: float) -> tuple[_Tru
         at the midpoint of the box, and a bound of everything that is bounded by magnitude: coupling
         of modes, errors of the tables of all modes, cubic terms and remainders.
     """
-    modes = level.models.oscillators
-    table = level.tables[int(level.orders[output])]
-    constant: Array = np.zeros((2, len(level.excitation.time)))
-    constant[1] = level.models.coupling[:, output]
+    modes = level.modes.oscillators
+    table = level.tables[int(level.modes.orders[output])]
+    constant: Array = np.zeros((2, len(level.modes.time)))
+    constant[1] = level.modes.open[:, output]
     for mode, error in zip(modes, table.error, strict=True):
         constant[1] += mode.participation.magnitude()[:, output] @ error
     d = modes[0].omega.inputs
-    if not level.models.truncated:
+    if not level.modes.truncated:
         # no terms, whatever the node
         none = _TruncatedTerms(np.zeros((0, 1)), np.zeros((0, d)), np.zeros((0, d * (d + 1) // 2)))
         return none, constant
 
     responses = list[Array]()
     factors = list[TaylorModel]()
-    for truncated in level.models.truncated:
+    for truncated in level.modes.truncated:
         midpoint = truncated.response_midpoint[:, output]
         radius = truncated.response_radius[:, output]
         participation = truncated.participation[:, output]

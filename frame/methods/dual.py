@@ -213,7 +213,16 @@ class DualProof:
             if is_complete:
                 self._minimise(problems, goal, flow, box, pool, progress=tick)
             else:
-                self._minimise_peaks(problems, pool, needed=needed[nodes])
+                # No bound below the peak needs to be lower.
+                self._improve(
+                    problems,
+                    pool,
+                    numbers.PEAK_CELLS,
+                    numbers.PEAK_STEPS,
+                    slack=1.0,
+                    tick=tick,
+                    peaks_alone=self.bounds_peaks_alone,
+                )
             unit = np.zeros((*needed.shape, len(box.active)))
             for (o, s), problem in problems.items():
                 upper[nodes, o, s] = problem.upper
@@ -233,7 +242,7 @@ class DualProof:
             pruned_upper = upper.copy()
             jobs = []
             for (o, s), problem in problems.items():
-                above = problem.nodes_above_peak(np.flatnonzero(needed[nodes, o, s]))
+                above = problem.open_nodes(1.0)
                 if len(above):
                     job = pool.submit(prune_ends, level, problem, above)
                     jobs.append((o, s, nodes[above], job))
@@ -257,25 +266,8 @@ class DualProof:
             gap_fractions=fractions,
             pruned=PrunedPeaks(remaining, pruned_upper),
             least_peaks=least_peaks,
-            facts={"single_modes": len(level.models.oscillators)},
+            facts={"single_modes": len(level.modes.oscillators)},
         )
-
-    def _minimise_peaks(self, problems: Problems, pool: Executor, *, needed: Mask) -> None:
-        """Minimise the dual functions of the bounds above peaks over a sub-box, in one pass.
-
-        Args:
-            problems: The bounds, which are improved in place, by the indices of the output and of
-                the side: 0 for the output with its sign changed, 1 for the output.
-            pool: Threads.
-            needed: Bounds that are asked for, shape (times, outputs, 2).
-        """
-        jobs = []
-        for (o, s), problem in problems.items():
-            # A bound suffices if it exceeds the model by no more than the wanted gap plus all of
-            # its distance below the peak: no bound below the peak needs to be lower than the peak.
-            effort = problem.effort(numbers.PEAK_CELLS, numbers.PEAK_STEPS, slack_below_peak=1.0)
-            jobs.append((problem, np.flatnonzero(needed[:, o, s]), effort))
-        improve_all(jobs, pool, lambda done: None, peaks_alone=self.bounds_peaks_alone)
 
     def _minimise(
         self,
@@ -454,7 +446,7 @@ def _least_peaks(
         `lower`: guaranteed lower bounds of the smallest peaks, 0 or more; `upper`: upper bounds of
         the peak of one response that has a small one; shape (outputs,) each.
     """
-    count = len(level.orders)
+    count = len(level.modes.orders)
     found = list(pool.map(partial(least_peak, level), range(count)))
     lower = np.array([bound for bound, _ in found])
     unit = np.stack([point for _, point in found])

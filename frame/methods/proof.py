@@ -37,7 +37,7 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.methods.yielding_proof import YIELDING_GAP, prove_yielding
 from alphacut.frame.modes.damped import require_dissipation
-from alphacut.frame.modes.damped_models import as_oscillators
+from alphacut.frame.modes.damped_modes import as_oscillators
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.modes.model_error import (
     error_fractions,
@@ -355,7 +355,7 @@ def bound_levels(
         all_proved.append(proved)
         n_boxes.append(count)
 
-    between = as_oscillators(in_own_units, error * scale).interpolation_error(model.flow.time)
+    between = as_oscillators(in_own_units, error * scale).interpolation_error()
     facts = {
         "model_error": float(error.max()),
         "degree": model.degree,

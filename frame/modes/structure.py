@@ -2,8 +2,7 @@
 
 Covered is M q̈ + D q̇ + K q = −M ι a(t) + Σ b f(t) with D = a M + b K + 2 M Φ diag(ζ_k ω_k) Φᵀ M,
 whose undamped modes uncouple the equations of motion. Other structures are refused, with the
-reason. A structure of one unknown has one mode, whatever its damping and the factors of its
-outputs.
+reason. A structure of one unknown has one mode, whatever its damping.
 """
 
 from __future__ import annotations
@@ -71,8 +70,6 @@ def classical_structure(
             stiffness may be singular in the box.
     """
     assembly = system.assembly(parameters)
-    if len(assembly.pattern) == 1:
-        assembly = _with_unit_rows(assembly)
     assembly = with_classical_damping(assembly)
     displacements = assembly.q0
     velocities = assembly.v0
@@ -141,30 +138,6 @@ def _with_damping_by_mass(assembly: Assembly[TaylorModel]) -> Assembly[TaylorMod
         weights=None,
         dashpots=dashpots * 0.0,
         rayleigh=(a + solve(assembly.mass, dashpots)[0, 0], b),
-    )
-
-
-def _with_unit_rows(assembly: Assembly[TaylorModel]) -> Assembly[TaylorModel]:
-    """Return the same structure of one unknown with output rows that depend on no input.
-
-    An output that takes r(u) of the displacement, or of the velocity, is r(u) times a unit of it;
-    r(u) becomes a part of the output's factor.
-
-    Args:
-        assembly: `rows`, coefficients of m outputs on displacement and velocity, a Taylor model of
-            shape (m, 2), one of which is zero in each row; `accelerated`, on the absolute
-            acceleration, shape (m, 1); `row_factors`, shape (m,). Returned as it is if `rows` are
-            numbers.
-    """
-    if isinstance(assembly.rows, np.ndarray):
-        return assembly
-    takes_acceleration = (assembly.accelerated[:, 0] != 0).astype(float)
-    # The sum of the coefficients of displacement and velocity, one of which is zero.
-    coefficients = (assembly.rows @ np.ones((2, 1)))[:, 0]
-    return replace(
-        assembly,
-        rows=(assembly.rows.magnitude() > 0).astype(float),
-        row_factors=assembly.row_factors * (coefficients + takes_acceleration),
     )
 
 

@@ -483,7 +483,8 @@ def coupling_bounds(
         for s, source in enumerate(sources):
             by_slope = factors.by_slope[s, outputs]
             largest = table.responses(source, order).largest
-            slope = response_slopes(source, *largest, low_omega, max_quotient)
+            G, G_slope = largest
+            slope = response_slopes(source, G, G_slope, low_omega, max_quotient)
             at_nodes[:, outputs] += np.outer(slope, by_slope)
             # The coupling is the block's response a e(L) β less that of its oscillators, Σ a_j β_j
             # e(L_jj). With the interpolation error of e, its distance ℓ from a straight line, the
@@ -491,10 +492,10 @@ def coupling_bounds(
             # hence the coupling by twice `by_line` ℓ; or by twice its own largest value within the
             # step.
             max_force = source.load.extremes[0] if source.load else 0.0
-            within = _largest_within_steps(
+            G, G_slope = _largest_within_steps(
                 largest, time, max_force=max_force, max_sigma=max_sigma, order=order
             )
-            slope = response_slopes(source, *within, low_omega, max_quotient)
+            slope = response_slopes(source, G, G_slope, low_omega, max_quotient)
             by_line = np.outer(table.line_deviation(source, order), factors.by_line[s, outputs])
             interpolation_error[:, outputs] += 2 * np.minimum(by_line, np.outer(slope, by_slope))
     return CouplingBounds(at_nodes, interpolation_error, ranges)

@@ -138,21 +138,6 @@ def test_no_sampled_trajectory_deviates_by_more_than_the_proved_error(system, bo
     assert proved.max() < 1000 * deviation.max()
 
 
-def test_tables_of_the_modes_are_exact_under_any_record() -> None:
-    rng = np.random.default_rng(2)
-    for _ in range(10):
-        frame = replace(test_forces.random_structure(rng), dampers=())
-        step = float(rng.choice(test_forces.NODES))
-        cuts = boxes({"E": Interval(frame.modulus, 1.0001 * frame.modulus)}, (0,))
-        flow = LinearFlow(frame, ("E",), round(4 / step) * step, step, Exact())
-        model = ModalModel.of_degree(flow, cuts, 4)
-        truth = test_forces.motion(replace(frame, modulus=1.0001 * frame.modulus), flow.time)
-        everywhere = (np.ones((truth.size, 1)), *map(np.ravel, np.indices(truth.shape)))
-        for values in (model.values(np.ones((1, 1)))[0], model.at(*everywhere)[0]):
-            wrong = np.abs(values.reshape(truth.shape) - truth).max(0)
-            assert (wrong < 1e-10 * np.abs(truth).max(0)).all()
-
-
 def test_modes_that_are_left_out_count_as_an_error_of_the_start() -> None:
     flow = LinearFlow(SHAKEN, ("E",), 10.0, 0.1, Exact())
     cuts = boxes(NARROW, (0,))

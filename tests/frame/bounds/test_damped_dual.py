@@ -19,7 +19,7 @@ from alphacut.frame import (
 from alphacut.frame.boxes import Boxes, UnitFlow, boxes
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.modes.damped_models import damped_models
+from alphacut.frame.modes.damped_modes import damped_modes
 from alphacut.frame.verification.self_test import structures_at
 from alphacut.fuzzy import Interval
 from tests.frame.motions import random_points, require_inside
@@ -101,11 +101,11 @@ def test_oscillators_and_feedthrough_add_up_to_the_response(moved, rng):
     cuts = Boxes(names, np.zeros(1), 0.99 * centre[None], 1.01 * centre[None], centre)
     flow = LinearFlow(system, names, 2.0, 0.02, Exact())
     size = np.abs(flow.values(centre[None])[0]).max(0)
-    found = damped_models(flow, cuts, {}, 1e-3 * size)
+    found = damped_modes(flow, cuts, {}, 1e-3 * size)
     for u in rng.uniform(-1, 1, (3, 3)):
         (motion,) = structures_at(system, names, centre * (1 + 0.01 * u)[None])
         total = np.zeros((len(flow.time), 4))
-        for mode in found.models.oscillators:
+        for mode in found.oscillators:
             omega, decay = (x.at(u[None])[0] for x in (mode.omega, mode.decay))
             sigma = np.array([-decay + 1j * omega])
             for source, factor in zip(
@@ -115,12 +115,12 @@ def test_oscillators_and_feedthrough_add_up_to_the_response(moved, rng):
                 if source.load:
                     G = duhamel(sigma, source.load, flow.time)
                 total += source.read(sigma, G) * factor
-        for term in found.models.truncated:
+        for term in found.truncated:
             total += np.einsum(
                 "so,sot->to", term.participation.at(u[None])[0], term.response_midpoint
             )
         exact = motion.outputs(flow.time).values
-        assert (np.abs(total - exact) <= found.models.coupling + 1e-4 * size).all()
+        assert (np.abs(total - exact) <= found.open + 1e-4 * size).all()
         assert (np.abs(total - exact) <= 0.02 * size).all()
 
 

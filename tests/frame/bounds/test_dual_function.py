@@ -33,11 +33,11 @@ def test_any_multipliers_bound_any_motion(rng):
     time = np.arange(0, 4.01, 0.5)
     level = level_of(model, fuzzy, time)
     values = exact_motions(model, random_points(fuzzy, 200, rng), fuzzy, 4.0, 0.5)
-    for o in range(len(level.orders)):
+    for o in range(len(level.modes.orders)):
         for s, side in enumerate((-1.0, 1.0)):
             problem = OutputBounds.initial(level, o, s, 1.0)
             columns, rows = problem.data.grid_points.astype(int)
-            whole = np.tile([0, columns - 1, 0, rows - 1], (len(level.models.oscillators), 1))
+            whole = np.tile([0, columns - 1, 0, rows - 1], (len(level.modes.oscillators), 1))
             for node in range(1, len(time)):
                 size = np.abs(values[:, node, o]).max() * 10.0 ** rng.uniform(-2, 1)
                 mu = size * rng.normal(size=len(problem.data.linear))
@@ -109,7 +109,7 @@ def test_models_over_a_part_bound_motions_there(box, rng):
     level = box.level()
     part, own = level.on_subbox(*ends), 2 * (unit - ends[0]) / (ends[1] - ends[0]) - 1
     for whole, narrow, grid in zip(
-        level.models.oscillators, part.models.oscillators, part.grids, strict=True
+        level.modes.oscillators, part.modes.oscillators, part.grids, strict=True
     ):
         assert narrow.omega.at(own) == pytest.approx(whole.omega.at(unit), rel=1e-12)
         first, last = narrow.table_cell(grid)[:2]

@@ -5,6 +5,7 @@ import pytest
 
 from alphacut.frame import DualProof, Force, History, StoreyFrame, envelope
 from alphacut.fuzzy import Interval
+from tests.frame.motions import exact_motions, random_points
 
 NOMINAL = {
     "m1": 2e4,
@@ -19,22 +20,6 @@ NOMINAL = {
     "F1": 2e4,
 }
 OUTPUTS = ("q1", "v1", "a1", "base_shear", "overturning_moment")
-
-
-def exact_outputs(p, gravity, time):
-    """Outputs (S, T, m) of M ẍ + D ẋ + K x = F at parameters (S, 1), in closed form."""
-    square = (p["k1"] - p["m1"] * gravity / p["l1"]) / p["m1"]
-    by_springs = p["rayleigh_stiffness"] * p["k1"] / p["m1"]
-    twice_decay = p["d1"] / p["m1"] + p["rayleigh_mass"] + by_springs
-    decay = twice_decay / 2 + p["zeta"] * np.sqrt(square)
-    omega, push = np.sqrt(square - decay**2), p["F1"] / p["m1"]
-    rest = push / square
-    cosine = p["q1_0"] - rest
-    sine = (p["v1_0"] + decay * cosine) / omega
-    wave = np.exp(-decay * time) * np.exp(1j * omega * time) * (cosine - 1j * sine)
-    q, v = rest + wave.real, ((1j * omega - decay) * wave).real
-    a = push - 2 * decay * v - square * q
-    return np.stack([q, v, a, p["k1"] * q, p["l1"] * p["k1"] * q], -1)
 
 
 @pytest.mark.parametrize("gravity", [0.0, 500.0])  # the latter halves the stiffness
@@ -58,10 +43,7 @@ def test_one_floor_with_a_dashpot_and_its_overturning_moment_is_proved(gravity, 
     inputs = {x: Interval(NOMINAL[x] * (1 - width), NOMINAL[x] * (1 + width)) for x in fuzzy}
     found = envelope(frame, inputs, DualProof(), duration=1.0, step=0.02, alpha=(0,))
     assert found.nature == "guaranteed"
-    unit = rng.uniform(-1, 1, (2000, len(fuzzy)))
-    unit[::2] = np.sign(unit[::2])
-    points = {x: NOMINAL[x] * (1 + width * unit[:, [k]]) for k, x in enumerate(fuzzy)}
-    values = exact_outputs(points, gravity, found.time)
+    values = exact_motions(frame, random_points(inputs, 500, rng), inputs, 1.0, 0.02)
     reached = np.stack([-values, values]).max(1)
     bound = np.stack([-found.lower[0], found.upper[0]])
     size = np.abs(values).max((0, 1))

@@ -24,6 +24,7 @@ from alphacut.frame.modes.blocks import (
     max_eigenvalue_decrease,
     subspace_series,
 )
+from alphacut.frame.modes.classical_modes import ModeSelection, classical_modes
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
 from alphacut.frame.modes.intervening import (
     BlockParticipation,
@@ -31,7 +32,6 @@ from alphacut.frame.modes.intervening import (
     oscillators,
     source_patterns,
 )
-from alphacut.frame.modes.models import ModalResponseModels, ModeSelection
 from alphacut.frame.modes.structure import classical_structure
 from alphacut.frame.modes.truncated_modes import (
     WeightedSums,
@@ -174,59 +174,10 @@ def frame_in_box(storeys=4, width=0.05, **values):
     return own, names, centre, radius, over_box(own, names, centre - radius, centre + radius)
 
 
-def along(own, names, centre, radius, i):
-    """The structure where input i alone varies."""
-    only = radius * (np.arange(len(names)) == i)
-    return over_box(own, names, centre - only, centre + only)
-
-
 def all_blocks(structure):
     """All blocks of a structure."""
     centre, used = centred_matrices(structure.mass, structure.stiffness)
     return enclose_subspaces(centre, used, centre.mode_count)
-
-
-def exact_modes(own, names, centre, radius, u):
-    """λ and shapes, those with 1 in their own coordinate of the middle, at points u."""
-    n = own.floors
-    below = np.eye(n) - np.eye(n, k=-1)
-
-    def pencil(values):
-        k, m = values[:n], values[n:]
-        return below.T @ np.diag(k) @ below, np.diag(m)
-
-    basis = eigh(*pencil(centre))[1]
-    for row in centre + radius * u:
-        K, M = pencil(row)
-        squared, shape = eigh(K, M)
-        seen = np.linalg.solve(basis, shape)
-        yield squared, seen / np.diag(seen)
-
-
-def test_half_of_a_remainder_of_eigenpairs_would_not_do():
-    own, names, centre, radius, _ = frame_in_box(2, 0.1)
-    first = (0, 0)
-    for i, entries in (
-        (0, {"eigenvalue_block": first, "shapes": (0, 1), "modal_mass": first}),
-        (2, {"mass_times_shapes": first}),
-    ):
-        found, u = all_blocks(along(own, names, centre, radius, i)), np.array([-1.0, 1])
-        ends = exact_modes(own, names, centre, radius, u[:, None] * np.eye(4)[i])
-        off = {name: [] for name in entries}
-        seen = found.centre.mass.at(u[:, None])
-        for at, M, (squared, shapes) in zip(u, seen, ends, strict=True):
-            x = shapes[:, :1].T
-            exact = {
-                "eigenvalue_block": squared[None],
-                "shapes": x,
-                "modal_mass": x @ M @ x.T,
-                "mass_times_shapes": x @ M,
-            }
-            for name, entry in entries.items():
-                value = getattr(found.blocks[0], name).at(np.array([[at]]))[0]
-                off[name].append(abs(exact[name][entry] - value[entry]))
-        for name, entry in entries.items():
-            assert is_tight(np.max(off[name]), getattr(found.blocks[0], name).remainder[entry])
 
 
 def test_half_of_the_range_of_eigenvalues_would_not_do():
@@ -258,8 +209,8 @@ def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
     springs = classical_structure(masses_on_springs(centre), {x: p[i] for i, x in enumerate("abc")})
     both = springs.initial_state.widened(np.array([[0.0] * 3, [0.1, 0.1, 0.0]]))
     excitation = Excitation(time, [Source.named("velocity")])
-    models = ModalResponseModels.from_structure(replace(springs, initial_state=both), excitation)
-    level = LevelModels.from_models(models, springs.derivative_orders, excitation)
+    modes = classical_modes(replace(springs, initial_state=both), excitation)
+    level = LevelModels.from_modes(modes)
     bounds = [OutputBounds.initial(level, 0, s, 1e-6) for s in (0, 1)]
     for of_side in bounds:
         of_side.improve(np.arange(len(time)), of_side.effort(240, 100, 1.0, 0.25))
@@ -407,12 +358,12 @@ def test_modes_known_by_sums_stay_within_both_norms(power, monkeypatch):
 
     monkeypatch.setattr("alphacut.frame.modes.truncated_modes._with_best_weights", chosen)
     monkeypatch.setattr(
-        "alphacut.frame.modes.models.required_modes",
+        "alphacut.frame.modes.classical_modes.required_modes",
         lambda *_, **__: ModeSelection(1, np.zeros(9)),
     )
     load = Source.named("load", RECORD)
     excitation = Excitation(time, [load])
-    models = ModalResponseModels.from_structure(structure, excitation, np.ones(1))
+    models = classical_modes(structure, excitation, np.ones(1))
     (others,) = models.truncated
     assert len(models.oscillators) == 1
     ratios = np.zeros(len(time))
@@ -685,30 +636,3 @@ def test_the_slope_of_a_slow_mode_within_a_step_is_bounded(order, rng):
         if order:
             exact += order * (1j * omega) ** (order - 1) * np.trapezoid(waves, s)
         assert slopes[1] >= abs(exact) * (1 - 1e-6)
-
-
-@pytest.mark.parametrize("order", [3, 4])
-def test_forms_of_inverses_stay_within_their_rests(order):
-    rng, d, n, shares = np.random.default_rng(order), 3, 4, []
-    matrices = rng.normal(size=(d, n, n))
-    A = TaylorModel(
-        (np.diag([1.0, 2, 3, 5])[None], 0.03 * (matrices + matrices.swapaxes(1, 2))),
-        np.zeros((n, n)),
-        d,
-        order,
-    )
-    left, right = (
-        TaylorModel(
-            (rng.normal(size=(1, m, n)), 0.1 * rng.normal(size=(d, m, n))),
-            np.zeros((m, n)),
-            d,
-            order,
-        )
-        for m in (2, 3)
-    )
-    found = inverse_form(A, left, right, 0.5)
-    for u in rng.uniform(-1, 1, (300, d)):
-        (a,), (x,), (y,) = (model.at(u[None]) for model in (A, left, right))
-        off = np.abs(x @ np.linalg.inv(a) @ y.T - found.at(u[None])[0])
-        shares.append((off / found.remainder).max())
-    assert 3e-3 <= max(shares) <= 1

@@ -5,6 +5,7 @@ import pytest
 from scipy.linalg import eigh
 
 from alphacut.frame import Auto, DualProof, Force, History, Proof, StoreyFrame, envelope
+from alphacut.frame.verification.self_test import structures_at
 from alphacut.fuzzy import FailedError, Interval
 
 STEPS = 8
@@ -15,35 +16,6 @@ def zero_at(step, parts, rng):
     samples = np.zeros(STEPS * parts * 2 + 1)
     samples[1::2] = rng.choice([-1.0, 1.0], len(samples) // 2)
     return History(step / parts / 2, samples)
-
-
-def acceleration(mass, omega, ratio, force, amplitude, times):
-    """Relative acceleration of an oscillator at rest at t = 0, piecewise exact, shape (T,)."""
-    samples, h = amplitude * force.samples, force.step
-    A = np.array([[0.0, 1.0], [-(omega**2), -2 * ratio * omega]])
-    state, out = np.zeros(2), np.empty(len(times))
-    piece = np.minimum((times / h + 1e-9).astype(int), len(samples) - 2)
-    rate, modes = np.linalg.eig(A)
-    inverse = np.linalg.inv(modes)
-    for k in range(len(samples) - 1):
-        slope = (samples[k + 1] - samples[k]) / h
-
-        def moved(tau, k=k, slope=slope, state=state):
-            """x(τ) of ẋ = A x + e (f_k + slope τ)/m from the state at the beginning."""
-            load = inverse @ np.array([0.0, 1.0 / mass])
-            grown = np.exp(rate * tau)
-            constant = load * (grown - 1) / rate
-            linear = load * (grown - 1 - rate * tau) / rate**2
-            return (
-                modes @ (grown * (inverse @ state) + samples[k] * constant + slope * linear)
-            ).real
-
-        for row in np.flatnonzero(piece == k):
-            tau = times[row] - k * h
-            x = moved(tau)
-            out[row] = A[1] @ x + (samples[k] + slope * tau) / mass
-        state = moved(h)
-    return out
 
 
 @pytest.mark.parametrize(("method", "parts"), [(Proof(workers=1), 4), (DualProof(workers=1), 1)])
@@ -65,8 +37,9 @@ def test_no_acceleration_leaves_its_bounds_between_nodes(method, parts, rng):
     offsets = np.sort(rng.random(20))
     times = (np.arange(STEPS)[:, None] + offsets).ravel() * step
     largest = 0.0
-    for m, k in ((x, y) for x in inputs["m1"].support for y in inputs["k1"].support):
-        values = acceleration(m, np.sqrt(k / m), 0.03, history, amplitude, times).reshape(STEPS, -1)
+    corners = np.array([(m, k) for m in inputs["m1"].support for k in inputs["k1"].support])
+    for judge in structures_at(frame, ("m1", "k1"), corners):
+        values = judge.outputs(times).values.reshape(STEPS, -1)
         upper = np.maximum(bounds.upper[0, 1:, 0], bounds.upper[0, :-1, 0]) + bounds.between[1:, 0]
         lower = np.minimum(bounds.lower[0, 1:, 0], bounds.lower[0, :-1, 0]) - bounds.between[1:, 0]
         assert (values <= upper[:, None] + 1e-12).all()

@@ -12,7 +12,7 @@ from alphacut.frame import (
     StoreyFrame,
     envelope,
 )
-from alphacut.frame.verification.exact_motion import LinearMotion, LoadHistory
+from alphacut.frame.verification.self_test import structures_at
 from alphacut.fuzzy import Interval
 from tests.frame.motions import random_points
 
@@ -61,45 +61,6 @@ def random_frame(rng, *, has_dashpots):
     return frame, step, steps
 
 
-def chain(values):
-    """Matrix of springs or dashpots in a chain that is held at its first one."""
-    upper = np.append(values[1:], 0.0)
-    return np.diag(values + upper) - np.diag(values[1:], 1) - np.diag(values[1:], -1)
-
-
-def exact_accelerations(frame, inputs, times):
-    """Accelerations of all floors with some inputs by name, from their definitions, (T, n)."""
-    p, n = {**frame.parameters, **inputs}, frame.floors
-    masses, springs, dampers = (np.array([p[f"{x}{z + 1}"] for z in range(n)]) for x in "mkd")
-    M, K, D = np.diag(masses), chain(springs), chain(dampers)
-    if "zeta" in p:  # Σ 2 ζ ω (M φ) (M φ)ᵀ of modes φ with φᵀ M φ = 1
-        root = np.sqrt(masses)
-        squared, shapes = np.linalg.eigh(K / np.outer(root, root))
-        momenta = root[:, None] * shapes
-        D = D + (momenta * (2 * p["zeta"] * np.sqrt(squared))) @ momenta.T
-    push = np.zeros((n, len(frame.loads)))
-    for k, (force, name) in enumerate(zip(frame.loads, frame.force_names, strict=True)):
-        push[force.at - 1, k] = p[name]
-    histories = [force.history for force in frame.loads]
-    motion = LinearMotion(
-        mass=M,
-        damping=D,
-        stiffness=K,
-        rows=-np.linalg.solve(M, np.hstack([K, D])),
-        start=np.zeros(2 * n),
-        pattern=np.zeros(n),
-        record=np.zeros(0),
-        record_step=0.0,
-        forces=push,
-        feeds=np.linalg.solve(M, push),
-        histories=tuple(
-            LoadHistory(x.samples, x.step, x.start, x.is_held, x.frequency, x.phase)
-            for x in histories
-        ),
-    )
-    return motion.outputs(times)[0]
-
-
 def ratios_of_a_random_frame(method, rng):
     """Require bounds that hold; return what is stated between nodes over what motions stray."""
     has_dashpots = method.name != "dual" and rng.random() < 0.5
@@ -110,8 +71,8 @@ def ratios_of_a_random_frame(method, rng):
         name: Interval((1 - width) * frame.parameters[name], (1 + width) * frame.parameters[name])
         for name in rng.choice(uncertain, int(rng.integers(1, 4)), replace=False)
     }
-    motion = {"duration": steps * step, "step": step, "alpha": [0.0], "progress": False}
-    bounds = envelope(frame, inputs, method, **motion)
+    given = {"duration": steps * step, "step": step, "alpha": [0.0], "progress": False}
+    bounds = envelope(frame, inputs, method, **given)
     fractions = np.tile(np.arange(1, EQUAL + 1) / (EQUAL + 1), (steps, 1))
     fractions = np.sort(np.hstack([fractions, rng.random((steps, RANDOM))]), axis=1)
     fractions = np.hstack([np.zeros((steps, 1)), fractions])
@@ -120,8 +81,8 @@ def ratios_of_a_random_frame(method, rng):
     is_guaranteed = bounds.nature == "guaranteed"
     assert is_guaranteed or method.name == "graph-follower"
     error = 0.0 if is_guaranteed else bounds.error[0]
-    for point in random_points(inputs, MOTIONS, rng):
-        values = exact_accelerations(frame, dict(zip(inputs, point, strict=True)), times)
+    for motion in structures_at(frame, tuple(inputs), random_points(inputs, MOTIONS, rng)):
+        values = motion.outputs(times).values
         nodes = values[:: fractions.shape[1]]
         inner = values[:-1].reshape(steps, -1, frame.floors)
         rounding = 1e-9 * np.abs(values).max(0)
@@ -162,14 +123,13 @@ def test_bounds_before_a_jump_of_a_force_at_a_node_hold_and_count_it_once(method
         loads=[Force(2, 1.2e4, History(0.1, samples))],
     )
     inputs = {"k2": Interval(2.97e7, 3.03e7), "F2": Interval(1.19e4, 1.21e4)}
-    motion = {"duration": steps * step, "step": step, "alpha": [0.0], "progress": False}
-    bounds = envelope(frame, inputs, method, **motion)
+    given = {"duration": steps * step, "step": step, "alpha": [0.0], "progress": False}
+    bounds = envelope(frame, inputs, method, **given)
     end = round(0.1 * (count - 1) / step)
     fractions = np.append(np.arange(20) / 20, 1 - 1e-9)
     times = (end - 1 + fractions) * step
-    for point in random_points(inputs, MOTIONS, rng):
-        at_all = np.append(times, end * step)
-        values = exact_accelerations(frame, dict(zip(inputs, point, strict=True)), at_all)
+    for motion in structures_at(frame, tuple(inputs), random_points(inputs, MOTIONS, rng)):
+        values = motion.outputs(np.append(times, end * step)).values
         for sign, at_nodes in ((1.0, bounds.upper[0]), (-1.0, -bounds.lower[0])):
             bound = np.maximum(at_nodes[end - 1], at_nodes[end]) + bounds.between[end]
             assert (sign * values <= bound + 1e-9).all()

@@ -1,4 +1,4 @@
-"""Models of the response of a structure whose dashpots couple the modes, as oscillators.
+"""Modes of a structure whose dashpots couple them, as oscillators.
 
 A damped mode λ = −g + iω with the coefficient C = a + ib adds 2 Re C ρ(t; λ) to an output, with
 the Duhamel integral ρ of a load, or exp(λ t). In the responses of `Source`, Re ρ + (g/ω) Im ρ of a
@@ -17,12 +17,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from math import comb
-from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.base.arrays import Array, Ints
-from alphacut.frame import numbers
+from alphacut.base.arrays import Array
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.taylor_model import ORDER, TaylorModel, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -30,61 +28,17 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.modes.intervening import Oscillator, range_of
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.modes.model_error import error_between_nodes, error_fractions, proved_error
-from alphacut.frame.modes.models import ModalResponseModels
+from alphacut.frame.modes.modes import Modes
 from alphacut.frame.modes.truncated_modes import TruncatedModes, feedthroughs
 from alphacut.frame.records.history import History
 from alphacut.frame.response.load_tables import Direct
-from alphacut.frame.response.oscillators import Oscillators, Source, grid_over
+from alphacut.frame.response.oscillators import Source
 from alphacut.frame.structures.loads import distinct_histories
 
 
-class DampedModels(NamedTuple):
-    """Models over a box, for all T time nodes and m outputs, and the sources that move them."""
-
-    models: ModalResponseModels
-    sources: list[Source]
-
-    def at(self, nodes: Ints | slice, outputs: Ints | slice) -> DampedModels:
-        """Return the models at some nodes and for some outputs."""
-        oscillators = [
-            replace(mode, participation=mode.participation[:, outputs])
-            for mode in self.models.oscillators
-        ]
-        truncated = [x.at(nodes, outputs) for x in self.models.truncated]
-        models = ModalResponseModels(
-            oscillators=oscillators,
-            truncated=truncated,
-            coupling=self.models.coupling[nodes][:, outputs],
-            interpolation_error=self.models.interpolation_error[nodes][:, outputs],
-        )
-        return DampedModels(models, self.sources)
-
-    def interpolation_error(self, time: Array) -> Array:
-        """Bound the distance of outputs from a straight line within each time step, shape (T, m).
-
-        Row j belongs to the step that ends at node j.
-
-        Args:
-            time: All time nodes, shape (T,), in s.
-
-        Raises:
-            UnprovedError: A mode turns too far within a sample interval of a load.
-        """
-        error: Array = self.models.interpolation_error + sum(
-            x.interpolation_error for x in self.models.truncated
-        )
-        for mode in self.models.oscillators:
-            points = (numbers.DEVIATION_POINTS, 3)
-            grid = grid_over(mode.omega_range, mode.quotient_range, points)
-            oscillators = Oscillators(grid, time, (0,))
-            of_sources = [oscillators.line_deviation(source, 0) for source in self.sources]
-            error += np.transpose(of_sources) @ mode.participation.magnitude()
-        return error
-
-
-def damped_models(
+def damped_modes(
     flow: LinearFlow, boxes: Boxes, fixed: Mapping[str, float], tolerance: Array
-) -> DampedModels:
+) -> Modes:
     """Return models of a structure's response over a box whose inputs all have a width.
 
     The degree of the polynomials rises until their error is within the tolerance, or the number of
@@ -130,7 +84,7 @@ def _model_of_degree(
     return model, proved_error(model)
 
 
-def as_oscillators(model: ModalModel, error: Array) -> DampedModels:
+def as_oscillators(model: ModalModel, error: Array) -> Modes:
     """Return a modal model with its error, shape (T, m), as oscillators and what they leave open.
 
     What forces add at once stands beside the oscillators.
@@ -178,10 +132,12 @@ def as_oscillators(model: ModalModel, error: Array) -> DampedModels:
         forces = distinct_histories(model.flow.system.loads)
         factors = model.structure.feeds.truncated(ORDER).T
         truncated.append(feedthroughs(factors, forces, model.flow.time))
-    models = ModalResponseModels(
+    return Modes(
+        time=model.flow.time,
+        sources=sources,
+        orders=np.zeros(error.shape[1], int),
         oscillators=oscillators,
         truncated=truncated,
-        coupling=error,
-        interpolation_error=error_between_nodes(model, error),
+        open=error,
+        open_between=error_between_nodes(model, error),
     )
-    return DampedModels(models, sources)

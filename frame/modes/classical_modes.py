@@ -1,13 +1,13 @@
-"""Response of a structure over a box: oscillators, what couples them, and all other modes."""
+"""Classical modes over a box: oscillators, what couples them, and all other modes by sums."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.frame.calculus.taylor_model import TaylorModel, all_on_subbox, concatenate
+from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import CentredMatrices
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
@@ -18,6 +18,7 @@ from alphacut.frame.modes.intervening import (
     oscillators,
     source_patterns,
 )
+from alphacut.frame.modes.modes import Modes
 from alphacut.frame.modes.structure import ClassicalStructure
 from alphacut.frame.modes.truncated_modes import (
     TruncatedModes,
@@ -31,114 +32,82 @@ from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.response.oscillators import POWERS
 
 
-@dataclass(frozen=True, eq=False)
-class ModalResponseModels:
-    """Models of a structure's response over a box, for T time nodes and m outputs."""
+def classical_modes(
+    structure: ClassicalStructure,
+    excitation: Excitation,
+    truncation_tolerance: Array | None = None,
+) -> Modes:
+    """Return the modes of a structure without coupling dashpots over its box.
 
-    oscillators: list[Oscillator]  # one for each mode that is enclosed as such
-    # modes that are known by sums: those of a block, and all that are not enclosed
-    truncated: list[TruncatedModes]
-    coupling: Array  # bound of what couples the oscillators of blocks, (T, m)
-    # bound of the distance from straight lines between nodes of what blocks of several modes add,
-    # (T, m)
-    interpolation_error: Array
+    The lowest modes are enclosed in blocks. A block of one mode is an oscillator. A larger one
+    is an oscillator for each mode and a bound of their coupling or, where that is narrower,
+    modes known by their sums, as all modes are that are not enclosed.
 
-    def on_subbox(self, low: Array, high: Array) -> ModalResponseModels:
-        """Return the models over the sub-box low ≤ u ≤ high, in its own unit coordinates.
+    Args:
+        structure: The structure over the box.
+        excitation: Time nodes and sources.
+        truncation_tolerance: Allowed error of each output by truncated modes, shape (m,). All
+            modes are enclosed, as precisely as possible, unless it is given.
 
-        Bounds of the coupling of oscillators and between time nodes stay those of the whole box,
-        which are valid in the sub-box, too.
+    Raises:
+        UnprovedError: None of its modes can be enclosed.
+        numpy.linalg.LinAlgError: The mode shapes at the midpoint of the box are singular.
+    """
+    centre, used = centred_matrices(structure.mass, structure.stiffness)
+    to_centred = np.asarray(np.linalg.inv(centre.basis), float)
+    patterns = source_patterns(structure, excitation.sources) @ to_centred.T
+    selection = ModeSelection(centre.mode_count, np.zeros(centre.mode_count))
+    if truncation_tolerance is not None:
+        selection = required_modes(
+            structure, centre, patterns, excitation, tolerance=truncation_tolerance
+        )
+    found = enclose_subspaces(centre, used, selection.count, selection.eigenvalue_tolerances)
+    if not found.blocks:
+        raise UnprovedError(
+            "no mode keeps clear of the others", "take narrower inputs", found.bisection_input
+        )
+    rows = structure.initial_state.like(structure.output_rows) @ centre.basis
+    participations = [
+        BlockParticipation.from_block(block, rows, patterns, used) for block in found.blocks
+    ]
 
-        Args:
-            low: Lower ends, shape (d,), not below −1.
-            high: Upper ends, shape (d,), not above 1.
-        """
-        models = [x for mode in self.oscillators for x in mode.models]
-        for modes in self.truncated:
-            models += [modes.participation, modes.amplitude]
-        restricted = iter(all_on_subbox(models, low, high))  # in the same order
-        oscillators = []
-        for mode in self.oscillators:
-            own_models = [next(restricted) for _ in mode.models]
-            oscillators.append(mode.on_subbox(own_models))
-        truncated = []
-        for modes in self.truncated:
-            participation = next(restricted)
-            amplitude = next(restricted)
-            truncated.append(replace(modes, participation=participation, amplitude=amplitude))
-        return replace(self, oscillators=oscillators, truncated=truncated)
-
-    @classmethod
-    def from_structure(
-        cls,
-        structure: ClassicalStructure,
-        excitation: Excitation,
-        truncation_tolerance: Array | None = None,
-    ) -> ModalResponseModels:
-        """Return models of a structure's response over its box.
-
-        The lowest modes are enclosed in blocks. A block of one mode is an oscillator. A larger one
-        is an oscillator for each mode and a bound of their coupling or, where that is narrower,
-        modes known by their sums, as all modes are that are not enclosed.
-
-        Args:
-            structure: The structure over the box.
-            excitation: Time nodes and sources.
-            truncation_tolerance: Allowed error of each output by truncated modes, shape (m,). All
-                modes are enclosed, as precisely as possible, unless it is given.
-
-        Raises:
-            UnprovedError: None of its modes can be enclosed.
-            numpy.linalg.LinAlgError: The mode shapes at the midpoint of the box are singular.
-        """
-        centre, used = centred_matrices(structure.mass, structure.stiffness)
-        patterns = source_patterns(structure, excitation.sources) @ np.linalg.inv(centre.basis).T
-        selection = ModeSelection(centre.mode_count, np.zeros(centre.mode_count))
-        if truncation_tolerance is not None:
-            selection = required_modes(
-                structure, centre, patterns, excitation, tolerance=truncation_tolerance
-            )
-        found = enclose_subspaces(centre, used, selection.count, selection.eigenvalue_tolerances)
-        if not found.blocks:
-            raise UnprovedError(
-                "no mode keeps clear of the others", "take narrower inputs", found.bisection_input
-            )
-        rows = structure.initial_state.like(structure.output_rows) @ centre.basis
-        participations = [
-            BlockParticipation.from_block(block, rows, patterns, used) for block in found.blocks
-        ]
-
-        all_oscillators = list[Oscillator]()
-        truncated = list[TruncatedModes]()
-        shape = (len(excitation.time), len(structure.derivative_orders))
-        coupling: Array = np.zeros(shape)
-        interpolation_error: Array = np.zeros(shape)
-        for of_block in participations:
-            of_modes = oscillators(structure, of_block, found)
-            if len(of_modes) > 1:
-                bounds = coupling_bounds(structure, of_block, found, excitation)
-                sums = modal_sums_of_block(of_block)
-                by_sums = response_of_truncated_modes(
-                    sums, bounds.ranges, structure, found, excitation
-                )
-                # The narrower of both is taken, in comparison with what is allowed. One oscillator
-                # at least must be left.
-                by_coupling = bounds.at_nodes.max(axis=0)
-                allowed = by_coupling if truncation_tolerance is None else truncation_tolerance
-                scale = np.maximum(allowed, 1e-300)
-                is_narrower = (by_sums.radius / scale).max() < (by_coupling / scale).max()
-                if is_narrower and (all_oscillators or of_block is not participations[-1]):
-                    truncated.append(by_sums)
-                    continue
-                coupling = coupling + bounds.at_nodes
-                interpolation_error = interpolation_error + bounds.interpolation_error
-            all_oscillators += of_modes
-        others = truncated_modes(structure, found, participations, rows, patterns, excitation)
-        if others is not None:
-            truncated.append(others)
-        if (structure.derivative_orders == 2).any():
-            truncated += _feedthroughs_of_forces(structure, excitation)
-        return cls(all_oscillators, truncated, coupling, interpolation_error)
+    all_oscillators = list[Oscillator]()
+    truncated = list[TruncatedModes]()
+    shape = (len(excitation.time), len(structure.derivative_orders))
+    coupling: Array = np.zeros(shape)
+    interpolation_error: Array = np.zeros(shape)
+    for of_block in participations:
+        of_modes = oscillators(structure, of_block, found)
+        if len(of_modes) > 1:
+            bounds = coupling_bounds(structure, of_block, found, excitation)
+            sums = modal_sums_of_block(of_block)
+            by_sums = response_of_truncated_modes(sums, bounds.ranges, structure, found, excitation)
+            # The narrower of both is taken, in comparison with what is allowed. One oscillator
+            # at least must be left.
+            by_coupling = bounds.at_nodes.max(axis=0)
+            allowed = by_coupling if truncation_tolerance is None else truncation_tolerance
+            scale = np.maximum(allowed, 1e-300)
+            is_narrower = (by_sums.radius / scale).max() < (by_coupling / scale).max()
+            if is_narrower and (all_oscillators or of_block is not participations[-1]):
+                truncated.append(by_sums)
+                continue
+            coupling = coupling + bounds.at_nodes
+            interpolation_error = interpolation_error + bounds.interpolation_error
+        all_oscillators += of_modes
+    others = truncated_modes(structure, found, participations, rows, patterns, excitation)
+    if others is not None:
+        truncated.append(others)
+    if (structure.derivative_orders == 2).any():
+        truncated += _feedthroughs_of_forces(structure, excitation)
+    return Modes(
+        time=excitation.time,
+        sources=excitation.sources,
+        orders=structure.derivative_orders,
+        oscillators=all_oscillators,
+        truncated=truncated,
+        open=coupling,
+        open_between=interpolation_error,
+    )
 
 
 def _feedthroughs_of_forces(
