@@ -105,7 +105,7 @@ def _read_file(
     max_bytes = _max_bytes_per_byte(compression) * file_size
     require(n_bytes <= max_bytes, name, what, f"what {file_size} bytes can hold")
     spacing, units = _spacing(file)
-    texts = [page.description for page in file.pages[:1] if not file.is_ome]
+    texts = [] if file.is_ome else [file.pages.first.description]
     require_spacing(name, spacing, sides, units, texts=texts, override=override)
 
     if compression == 5:  # LZW, which tifffile does not unpack without another package
