@@ -8,7 +8,7 @@ from numpy.polynomial.chebyshev import chebvander
 
 from alphacut.frame import Accelerogram, StoreyFrame
 from alphacut.frame.bounds.interpolated_box import InterpolatedFrame
-from alphacut.frame.bounds.interpolated_defects import defects, interpolate
+from alphacut.frame.bounds.interpolated_defects import _elastic_violation, defects, interpolate
 from alphacut.frame.calculus.interpolation import chebyshev_matrix
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.yielding import YieldingFlow
@@ -153,3 +153,69 @@ def test_an_event_behind_the_end_of_only_some_motions_does_not_count(rng):
     box = InterpolatedFrame(flow, np.arange(1))
     found = box.bounds(0.99 * k, 1.01 * k, np.full(len(box.loads[0].powers), 1e-9))
     assert found.error < 1e-3 * np.sqrt(k[0]) * motion[peak]
+
+
+def crisp_motion(rng):
+    """The motion of a frame without uncertain inputs: model, elements and which of these count."""
+    frame = isolated_building(rng, 1)
+    flow = YieldingFlow(frame, ("k1",), 1.5, 0.05)
+    box = InterpolatedFrame(flow, np.arange(0))
+    point = np.array([frame.parameters["k1"]])
+    properties, model = box._model(point, point)
+    elements, count = box._motions(properties, model, None)
+    return model, elements, slice(0, count)
+
+
+def defects_of(model, elements, part):
+    interpolant = interpolate(model, elements, part, with_rates=False)
+    return interpolant, defects(interpolant, elements.event[part])
+
+
+def test_a_defect_that_is_put_into_a_motion_is_counted_in_full(rng):
+    model, elements, part = crisp_motion(rng)
+    slider, n = model.slider_ends[1], model.floors
+    drift = np.sqrt(model.stiffness_ends[1] + slider * np.array([1, 0]))
+    by_floor = np.append(np.hypot(drift, np.append(drift[1:], 0)), 1 / np.sqrt(model.mass_ends[1]))
+    e = int(rng.integers(part.stop))
+    for row, norm in enumerate(by_floor):  # velocities of X, then those of P
+        series = elements.series.copy()
+        series[e, 1, row] += 1e-3
+        _, missed = defects_of(model, elements._replace(series=series), part)
+        assert missed.growth[e] >= 0.999e-3 * norm, (row, n)
+    for e in np.flatnonzero((elements.event[part] != 0) & (elements.phase[part] == 0)):
+        constant = elements.constant.copy()
+        constant[e] += 1e-3
+        _, missed = defects_of(model, elements._replace(constant=constant), part)
+        assert missed.growth[e] >= 0.999e-3 / np.sqrt(slider)
+
+
+def test_what_a_slider_falls_back_from_beyond_its_yield_force_is_counted_in_full(rng):
+    model, elements, part = crisp_motion(rng)
+    force = 0.7 * model.force
+    model = replace(model, force=force, force_ends=np.repeat(force, 2))
+    interpolant, missed = defects_of(model, elements, part)
+    times = np.linspace(0, 1, 2001)
+    for e in np.flatnonzero(elements.phase[part] == 0):
+        values = np.polynomial.polynomial.polyval(times, interpolant.slider_force[e, :, 0])
+        beyond = np.maximum(np.abs(values) - force[0], 0)
+        fall = np.maximum(-np.diff(beyond), 0).sum()
+        assert missed.violation[e].max() >= 0.999 * fall / np.sqrt(model.slider_ends[1])
+        assert missed.beyond[e].max() >= 0.999 * beyond.max()
+
+
+def test_what_passes_the_yield_force_between_samples_is_counted(rng):
+    # The force rises and falls several times within an element, beyond a level that it keeps at
+    # equally spaced times.
+    model, _, _ = crisp_motion(rng)
+    force = float(model.force[0])
+    roots = np.linspace(0, 1, int(rng.integers(3, 7)))
+    powers = np.polynomial.polynomial.polyfromroots(roots)
+    times = np.linspace(0, 1, 2001)
+    shape = np.polynomial.polynomial.polyval(times, powers)
+    size = float(rng.uniform(1e-6, 0.5)) * force / np.abs(shape).max()
+    powers = size * powers + force * (np.arange(len(powers)) == 0)
+    moved, most, _, _ = _elastic_violation(model, powers[:, np.newaxis], 0.0, 0.0, 0.0)
+    beyond = np.maximum(size * shape, 0)
+    fall = np.maximum(-np.diff(beyond), 0).sum()
+    assert fall * (1 - 1e-6) <= moved.max() <= 1.5 * fall
+    assert most.max() >= beyond.max() * (1 - 1e-6)
