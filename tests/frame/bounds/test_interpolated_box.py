@@ -140,6 +140,34 @@ def test_the_difference_to_exact_motions_is_below_its_bound(rng):
             assert (norm <= bound + 1e-8 * scale).all()
 
 
+def test_what_kinematics_miss_is_below_its_bound(rng):
+    """∫ |q̇₁ − v₁| dt of each element without dampers, at inputs between the nodes."""
+    inputs = np.append(rng.uniform(-1, 1, 6), [-1, 1])
+    points, weights = np.polynomial.legendre.leggauss(24)
+    powers = ((points[:, np.newaxis] + 1) / 2) ** np.arange(40)
+    undamped = {"dampers": [0.0, 0.0], "rayleigh": (0.0, 0.0)}
+    for hardening in (0.0, 0.1, 0.2):
+        frame = isolated_building(rng, 1, hardening=[hardening, 1.0], **undamped)
+        box = InterpolatedFrame(YieldingFlow(frame, ("k1",), 2, 0.05), np.arange(1))
+        ends = frame.parameters["k1"] * (1 + 0.02 * np.array([[-1], [1]]))
+        properties, model = box._model(*ends)
+        marched = box._motions(properties, model, None)
+        if marched is None:  # the box is too wide for one order of events
+            continue
+        elements, count = marched
+        found = interpolate(model, elements, slice(0, count), with_rates=False)
+        if found is None:  # or for the times of its elements
+            continue
+        missed = defects(found, elements.event[:count]).drift
+        order = np.arange(1, found.terms)[:, np.newaxis]
+        for y in chebvander(inputs, model.fine) @ chebyshev_matrix(model.fine):
+            speed = powers[:, : found.terms - 1] @ (order * (found.displacement[:, 1:, 0] @ y).T)
+            momentum = powers[:, : found.terms] @ (found.momentum[:, :, 0] @ y).T
+            missing = np.abs(speed - (found.length @ y) * momentum / frame.masses[0])
+            true = weights @ missing / 2
+            assert (true <= missed + 1e-14 * np.abs(speed).max()).all()
+
+
 def test_an_event_behind_the_end_of_only_some_motions_does_not_count(rng):
     # Free motions reach the yield drift at their first peak, or do not, just behind the end.
     still = Accelerogram(0.05, np.zeros(30))
