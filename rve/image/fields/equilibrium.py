@@ -13,11 +13,12 @@ then equilibrium is exact, and the energy alone is rounded. Axes and units are t
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 from itertools import product
+from tempfile import TemporaryFile
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -57,6 +58,8 @@ MAX_TABLES = 64
 """Number of ratios of moduli from which on they are rounded down to powers of 2^(1/32)."""
 CHUNK = 4096
 """Voxels or nodes that are worked on at once, which bounds the memory."""
+ByVoxels = Callable[[slice], Array]
+"""Function to the numbers of some of the voxels outside pores."""
 
 
 def solve_stresses(
@@ -88,12 +91,17 @@ def solve_stresses(
     strains = np.empty((len(pairs), len(pairs)))
     strains[:, order] = solved_loads(element_of(sides, dual=False))
     strains *= scale
-    reference = max(abs(hybrid.uniform_moments(strain)).max() for strain in strains)
+    shear = float(grid.shear.max(initial=0))
+    reference = shear * max(abs(hybrid.uniform_moments(strain)).max() for strain in strains)
     stresses = []
     for strain in strains:
         tractions = hybrid.tractions(strain, solver)
         unit = unit_of(max(reference, abs(tractions).max())) * 2.0**10
-        stresses.append(grid.balanced(np.rint(tractions / unit).astype(int), unit))
+        tractions /= unit
+        whole = np.rint(tractions, out=tractions).astype(int)
+        del tractions
+        # What is finished waits in a file: a load takes 27 moments a voxel.
+        stresses.append(_in_file(grid.balanced(whole, unit)))
     means, energy = grid.means_and_energy(stresses)
     bound = bound_of_trials(means * scale[:, np.newaxis], energy)
     # Index k of Voigt's order is component `order[k]` of the grid's.
@@ -121,6 +129,20 @@ class WholeStress(NamedTuple):
 
     tractions: Ints
     unit: float
+
+
+def _in_file(stress: WholeStress) -> WholeStress:
+    """Return a stress whose tractions lie in a file without a name, in place of memory.
+
+    Raises:
+        OSError: The folder of temporary files has no room.
+    """
+    with TemporaryFile() as file:
+        # A mapping that is written where the disk is full would end the process.
+        stress.tractions.tofile(file)
+        file.flush()
+        mapped = np.memmap(file, stress.tractions.dtype, "r", shape=stress.tractions.shape)
+        return WholeStress(mapped, stress.unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,15 +200,22 @@ class _Grid:
         """2 in the plane, 3 in space."""
         return len(self.shape)
 
-    def multiply(self, tables: Sequence[Array], vectors: Array) -> Array:
-        """Return the product of each voxel's table with its vector, shape (S, rows)."""
+    def multiply(self, tables: Sequence[Array], vectors: Array, rows: slice) -> Array:
+        """Return shear modulus times table times vector of some voxels, shape (voxels, …)."""
+        shear = self.shear[rows, np.newaxis]
         if len(tables) == 1:
-            return vectors @ tables[0].T
+            return np.asarray(shear * (vectors @ tables[0].T))
         result = np.empty((len(vectors), len(tables[0])))
-        for kind, table in enumerate(tables):
-            rows = np.flatnonzero(self.kind == kind)
-            result[rows] = vectors[rows] @ table.T
-        return result
+        of_rows = self.kind[rows]
+        for kind in np.unique(of_rows):
+            here = np.flatnonzero(of_rows == kind)
+            result[here] = vectors[here] @ tables[kind].T
+        return np.asarray(shear * result)
+
+    def chunks(self) -> Iterator[slice]:
+        """Yield groups of the voxels that are worked on at once."""
+        for start in range(0, len(self.shear), CHUNK):
+            yield slice(start, min(start + CHUNK, len(self.shear)))
 
     def balanced(self, tractions: Ints, unit: float) -> WholeStress:
         """Return whole tractions in equilibrium near given ones, which are changed.
@@ -310,9 +339,8 @@ class _Grid:
         value = np.zeros((loads, loads))
         squared_errors = np.zeros(loads)
         relative = TABLE_ERROR + (2 * d**3 + 4) * UNIT
-        chunks = range(0, len(self.shear), CHUNK)
-        for start in chunks:
-            rows = slice(start, start + CHUNK)
+        chunks = list(self.chunks())
+        for rows in chunks:
             moments = np.stack([self._moments(stress, rows) for stress in stresses])
             root = np.sqrt(self.shear[rows])
             for kind in np.unique(self.kind[rows]):
@@ -371,9 +399,12 @@ class _Grid:
                         of_face = moment[:, 1 + face_axes(d, axis).index(j), i]
                     found[load, k, self.copies.cells] += stress.unit * of_face
         combinations = np.linalg.pinv(means, rcond=1e-6).T / scale[:, np.newaxis]
-        found *= scale[:, np.newaxis]
-        result = np.tensordot(combinations, found, axes=1)
-        return np.asarray(result.reshape(len(pairs), len(pairs), *self.shape))
+        for start in range(0, found.shape[2], CHUNK):  # in place, which saves memory
+            rows = slice(start, start + CHUNK)
+            found[:, :, rows] = np.tensordot(
+                combinations, scale[:, np.newaxis] * found[:, :, rows], axes=1
+            )
+        return found.reshape(len(pairs), len(pairs), *self.shape)
 
 
 class _Loop(NamedTuple):
@@ -576,12 +607,14 @@ class _Hybrid:
         return cls(grid, faces, owned, total, blocks, inverse, diagonal, least)
 
     def uniform_moments(self, strain: Array) -> Array:
-        """Return the moments of a uniform strain of the unit cube, shape (S, moments)."""
+        """Return the moments of a uniform strain of the unit cube, shape (kinds, moments).
+
+        They are those of a voxel of each kind with a shear modulus of 1.
+        """
         displacement = (
             trace_matrix(self.grid.dimension) @ affine_displacements(self.grid.dimension) @ strain
         )
-        products = np.array([table.stiffness @ displacement for table in self.grid.tables])
-        return np.asarray(self.grid.shear[:, np.newaxis] * products[self.grid.kind])
+        return np.array([table.stiffness @ displacement for table in self.grid.tables])
 
     def tractions(self, strain: Array, solver: ConjugateGradient) -> Array:
         """Return moments of tractions on upper faces, balanced but for an unfinished solution.
@@ -596,13 +629,18 @@ class _Hybrid:
         Raises:
             FailedError: The solver does not converge.
         """
-        uniform = self.uniform_moments(strain)
-        load = -self._to_faces(uniform)
+        of_kind = self.uniform_moments(strain)
+
+        def uniform(rows: slice) -> Array:
+            return np.asarray(self.grid.shear[rows, np.newaxis] * of_kind[self.grid.kind[rows]])
+
+        residual = -self._to_faces(uniform)
         # The energy of the uniform strain is the scale of accuracies and the floor of solutions.
         shape = trace_matrix(self.grid.dimension) @ affine_displacements(self.grid.dimension)
-        scale = float(np.sum(uniform @ (shape @ strain)))
-        x = self._coarse(load, solver, scale, relative=1e-3)
-        residual = load - self._apply(x)
+        shear = np.bincount(self.grid.kind, self.grid.shear, len(of_kind))
+        scale = float(shear @ of_kind @ shape @ strain)
+        x = self._coarse(residual, solver, scale, relative=1e-3)
+        residual -= self._apply(x)
         direction = np.zeros_like(x)
         gamma = 1.0
         for _ in range(STEPS):
@@ -610,35 +648,46 @@ class _Hybrid:
             step += self._coarse(residual, solver, scale, relative=1e-2)
             last_gamma = gamma
             gamma = float(np.vdot(residual, step))
-            direction = step + gamma / last_gamma * direction if direction.any() else step
+            direction *= gamma / last_gamma
+            direction += step
             forces = self._apply(direction)
             curvature = float(np.vdot(direction, forces))
             if not curvature > 1e-14 * scale:  # nothing but rounding is left to gain
                 break
-            x += gamma / curvature * direction
-            residual -= gamma / curvature * forces
+            length = gamma / curvature
+            x += length * direction
+            forces *= length
+            residual -= forces
+            del step, forces  # leaves memory for the next ones
+        del direction
         # Here every load left counts, since it is swept down long trees: tuned.
         precise = replace(solver, accuracy=1e-3 * solver.accuracy)
         x += self._coarse(residual, precise, scale)
-        displacements = x[self.faces].reshape(len(uniform), -1)
-        tables = [table.stiffness for table in self.grid.tables]
-        moments = self.grid.multiply(tables, displacements)
-        moments *= self.grid.shear[:, np.newaxis]
-        return self._parted(moments + uniform)
+        del residual
+        return self._parted(lambda rows: self._moments(x, rows) + uniform(rows))
 
-    def _to_faces(self, moments: Array) -> Array:
-        """Return the sums of moments over the voxels of each face, shape (faces, dimension²)."""
-        by_face = moments.reshape(len(moments), self.faces.shape[1], -1)
-        total = np.zeros((self.n_faces, by_face.shape[2]))
-        for face in range(self.faces.shape[1]):  # no two voxels have the same face on one side
-            total[self.faces[:, face]] += by_face[:, face]
+    def _to_faces(self, moments: ByVoxels) -> Array:
+        """Return the sums of moments over the voxels of each face, shape (faces, dimension²).
+
+        Args:
+            moments: Function to the moments on the faces of some voxels, shape (voxels, moments).
+        """
+        total = np.zeros((self.n_faces, self.grid.dimension**2))
+        for rows in self.grid.chunks():
+            by_face = moments(rows).reshape(*self.faces[rows].shape, -1)
+            for face in range(self.faces.shape[1]):  # no two voxels have one face on one side
+                total[self.faces[rows, face]] += by_face[:, face]
         return total
+
+    def _moments(self, x: Array, rows: slice) -> Array:
+        """Return the moments on the faces of some voxels under displacements of faces."""
+        tables = [table.stiffness for table in self.grid.tables]
+        displacements = x[self.faces[rows]]
+        return self.grid.multiply(tables, displacements.reshape(len(displacements), -1), rows)
 
     def _apply(self, x: Array) -> Array:
         """Return the moments on faces under displacements of faces, both (faces, dimension²)."""
-        tables = [table.stiffness for table in self.grid.tables]
-        moments = self.grid.multiply(tables, x[self.faces].reshape(len(self.faces), -1))
-        return self._to_faces(moments * self.grid.shear[:, np.newaxis])
+        return self._to_faces(lambda rows: self._moments(x, rows))
 
     def _block_inverse(self, moments: Array) -> Array:
         """Return the approximate inverse of the blocks of faces, both (faces, dimension²)."""
@@ -677,11 +726,15 @@ class _Hybrid:
         """
         trace = trace_matrix(self.grid.dimension)
         tables = [trace.T @ table.stiffness @ trace for table in self.grid.tables]
-        own = load[self.faces] * self.owned[:, :, np.newaxis]
-        nodal = self._to_copies(own.reshape(len(own), -1) @ trace)
+
+        def of_corners(rows: slice) -> Array:
+            own = load[self.faces[rows]] * self.owned[rows, :, np.newaxis]
+            return np.asarray(own.reshape(len(own), -1) @ trace)
+
+        nodal = self._to_copies(of_corners)
         system = System(
             operator=lambda u: self._to_copies(
-                self.grid.shear[:, np.newaxis] * self.grid.multiply(tables, self._at_corners(u))
+                lambda rows: self.grid.multiply(tables, self._at_corners(u, rows), rows)
             ),
             preconditioner=self._precondition,
             load=nodal,
@@ -696,21 +749,29 @@ class _Hybrid:
             solver = replace(solver, accuracy=1.0)
         nodes = solver.solve(system)
         x = np.empty((self.n_faces, self.grid.dimension**2))
-        x[self.faces] = (self._at_corners(nodes) @ trace.T).reshape(*self.faces.shape, -1)
+        for rows in self.grid.chunks():
+            of_faces = self._at_corners(nodes, rows) @ trace.T
+            x[self.faces[rows]] = of_faces.reshape(*self.faces[rows].shape, -1)
         return x
 
-    def _at_corners(self, fields: Array) -> Array:
-        """Return displacements at the corners of voxels, (1, axes, copies) to (S, …)."""
-        return np.asarray(fields[0].T[self.grid.copies.copies].reshape(len(self.faces), -1))
+    def _at_corners(self, fields: Array, rows: slice) -> Array:
+        """Return displacements at the corners of some voxels, (1, axes, copies) to (voxels, …)."""
+        local = fields[0].T[self.grid.copies.copies[rows]]
+        return np.asarray(local.reshape(len(local), -1))
 
-    def _to_copies(self, forces: Array) -> Array:
-        """Return the sums of forces at the corners of voxels, (S, …) to (1, axes, copies)."""
+    def _to_copies(self, forces: ByVoxels) -> Array:
+        """Return the sums of forces at the corners of voxels, shape (1, axes, copies).
+
+        Args:
+            forces: Function to the forces at the corners of some voxels, shape (voxels, …).
+        """
         d = self.grid.dimension
-        copies = self.grid.copies
-        by_corner = forces.reshape(len(forces), -1, d)
-        total = np.zeros((len(copies.places), d))
-        for corner in range(copies.copies.shape[1]):  # no two voxels have the same one
-            total[copies.copies[:, corner]] += by_corner[:, corner]
+        copies = self.grid.copies.copies
+        total = np.zeros((len(self.grid.copies.places), d))
+        for rows in self.grid.chunks():
+            by_corner = forces(rows).reshape(*copies[rows].shape, d)
+            for corner in range(copies.shape[1]):  # no two voxels have the same one
+                total[copies[rows, corner]] += by_corner[:, corner]
         return np.ascontiguousarray(total.T)[np.newaxis]
 
     def _precondition(self, forces: Array) -> Array:
@@ -726,7 +787,7 @@ class _Hybrid:
         result[:, is_split] += forces[0][:, is_split] / self.diagonal.T[:, is_split]
         return np.asarray(result[np.newaxis])
 
-    def _parted(self, moments: Array) -> Array:
+    def _parted(self, moments: ByVoxels) -> Array:
         """Return tractions with the same moments on both sides of a face, and none on pores.
 
         Moments are averaged over the two voxels of a face. What each voxel loses by that acts on
@@ -734,21 +795,24 @@ class _Hybrid:
         meet there by the least forces that do it.
 
         Args:
-            moments: Moments on the faces of voxels, in equilibrium in each voxel, (S, moments).
+            moments: Function to the moments on the faces of some voxels, in equilibrium in each
+                voxel, shape (voxels, moments).
 
         Returns:
             Moments as in `WholeStress`, doubled along the face, shape (S, axes, dimension²).
         """
         d = self.grid.dimension
-        by_face = moments.reshape(len(moments), 2 * d, -1)
         jumps = self._to_faces(moments)
-        shared = np.ones(self.n_faces)
         for axis in range(d):
-            shared[self.faces[self.grid.above[axis] >= 0, 2 * axis + 1]] = 0.5
-        excess = (jumps * shared[:, np.newaxis])[self.faces]
-        nodal = excess.reshape(moments.shape) @ trace_matrix(d)
-        tractions = (by_face - excess)[:, 1::2].copy()
-        nodal = nodal.reshape(len(moments), -1, d)
+            jumps[self.faces[self.grid.above[axis] >= 0, 2 * axis + 1]] *= 0.5
+        trace = trace_matrix(d)
+        tractions = np.empty((len(self.faces), d, d**2))
+        nodal = np.empty((len(self.faces), 2**d, d))
+        for rows in self.grid.chunks():
+            excess = jumps[self.faces[rows]]
+            by_face = moments(rows).reshape(excess.shape)
+            tractions[rows] = (by_face - excess)[:, 1::2]
+            nodal[rows] = (excess.reshape(len(excess), -1) @ trace).reshape(-1, 2**d, d)
         by_place = self.grid.number.reshape(self.grid.shape)
         points = corners(d)
         axes = tuple(range(d))
