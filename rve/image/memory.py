@@ -8,12 +8,22 @@ from collections.abc import Sequence
 
 from alphacut.base.errors import RefusedError
 
+IN_FILES = 150**3
+"""Voxels from which on finished fields wait in files of the folder of temporary files."""
 
-def _bytes_per_element(dimension: int) -> float:
+
+def is_large(shape: Sequence[int], division: int = 1) -> bool:
+    """Return whether finished fields of a volume wait in files, and its sides for each other."""
+    return len(shape) == 3 and math.prod(shape) * division**3 >= IN_FILES
+
+
+def _bytes_per_element(shape: Sequence[int], division: int) -> float:
     """Return the memory of an element in the solutions of all cuts with their first guess."""
     # Measured within 1.25 of peaks at 128² … 512² pixels of two elements a side, 512² and 1024² of
-    # one, and 64³ … 128³ voxels.
-    return {2: 1450.0, 3: 1600.0}[dimension]
+    # one, and 64³ … 128³ voxels. With files 460 of solids, and 1040 beside pores.
+    if is_large(shape, division):
+        return 1050.0
+    return {2: 1450.0, 3: 1600.0}[len(shape)]
 
 
 def needed_memory(shape: Sequence[int], division: int = 1) -> float:
@@ -26,7 +36,7 @@ def needed_memory(shape: Sequence[int], division: int = 1) -> float:
     """
     program = 1e8  # of Python and its libraries, which are small beside any grid that matters
     elements = math.prod([n * division for n in shape])
-    return program + _bytes_per_element(len(shape)) * elements
+    return program + _bytes_per_element(shape, division) * elements
 
 
 def require_memory(shape: Sequence[int], division: int = 1) -> None:
@@ -45,7 +55,7 @@ def require_memory(shape: Sequence[int], division: int = 1) -> None:
     # now counts where a file is read.
     if needed > available:
         n = len(shape)
-        side = int((available / _bytes_per_element(n)) ** (1 / n) / division)
+        side = int((available / _bytes_per_element(shape, division)) ** (1 / n) / division)
         cells = {2: "pixels", 3: "voxels"}[n]
         what = f"{' × '.join(map(str, shape))} {cells}"
         allowed = f"up to {available / 1e9:.0f} GB of memory"

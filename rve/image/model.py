@@ -29,6 +29,7 @@ from alphacut.rve.image.fields.fluxes import solve_fluxes
 from alphacut.rve.image.fields.grid import device_array
 from alphacut.rve.image.fields.kernels import call_kernels
 from alphacut.rve.image.fields.split import SideSolution, solve_beside_pores
+from alphacut.rve.image.memory import is_large
 from alphacut.rve.image.phases import ModuliImages
 from alphacut.rve.result.moduli import ISOTROPIC, require_average
 
@@ -162,9 +163,10 @@ class GridModel(Generic[Bounds]):
         elements = [self._element(dual=dual) for dual in (True, False)]
         components = elements[0].part_matrix.shape
         # The sides share nothing but the images: two threads take half the time of one, as NumPy,
-        # SciPy and the kernels release the interpreter. A device works on one side at a time.
+        # SciPy and the kernels release the interpreter. A device works on one side at a time, and
+        # so does a grid whose finished fields leave the memory.
         workers = 2
-        if self.device != "cpu":
+        if self.device != "cpu" or is_large(images.shape, self.division):
             workers = 1
         if dimension == 2 or self.device != "cpu":
             elements = []  # without kernels

@@ -22,6 +22,7 @@ from alphacut.rve.image.fields.grid import (
     SLAB_CELLS,
     Fields,
     Operator,
+    finished_fields,
     gather,
     namespace,
     on_host,
@@ -432,7 +433,8 @@ def _least_energy_fields(
     preconditioner = FourierPreconditioner.of_material(element, constant, shape, xp)
     operator = Operator(element, coefficients)
     scale = minimum_energy(element, coefficients, modes)
-    fields = xp.empty((len(loads), element.unknowns, *shape))
+    whole = (len(loads), element.unknowns, *shape)
+    fields = finished_fields(whole, shape) if xp is np else xp.empty(whole)
     for k in range(len(loads)):  # one after another: solved together they take more memory
         this = slice(k, k + 1)
         system = System(

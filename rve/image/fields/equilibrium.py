@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 from itertools import product
-from tempfile import TemporaryFile
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -36,6 +35,7 @@ from alphacut.rve.image.fields.energy import (
     solved_loads,
 )
 from alphacut.rve.image.fields.forest import Forest, unit_of
+from alphacut.rve.image.fields.grid import finished_fields
 from alphacut.rve.image.fields.macro_element import (
     TABLE_ERROR,
     MacroElement,
@@ -93,15 +93,19 @@ def solve_stresses(
     strains *= scale
     shear = float(grid.shear.max(initial=0))
     reference = shear * max(abs(hybrid.uniform_moments(strain)).max() for strain in strains)
+    d = grid.dimension
+    # What is finished waits in a file where it is large: a load takes 27 moments a voxel.
+    finished = finished_fields((len(strains), len(grid.shear), d, d**2), grid.shape, int)
     stresses = []
-    for strain in strains:
+    for moments, strain in zip(finished, strains, strict=True):
         tractions = hybrid.tractions(strain, solver)
         unit = unit_of(max(reference, abs(tractions).max())) * 2.0**10
         tractions /= unit
         whole = np.rint(tractions, out=tractions).astype(int)
         del tractions
-        # What is finished waits in a file: a load takes 27 moments a voxel.
-        stresses.append(_in_file(grid.balanced(whole, unit)))
+        balanced = grid.balanced(whole, unit)
+        moments[:] = balanced.tractions
+        stresses.append(WholeStress(moments, balanced.unit))
     means, energy = grid.means_and_energy(stresses)
     bound = bound_of_trials(means * scale[:, np.newaxis], energy)
     # Index k of Voigt's order is component `order[k]` of the grid's.
@@ -129,20 +133,6 @@ class WholeStress(NamedTuple):
 
     tractions: Ints
     unit: float
-
-
-def _in_file(stress: WholeStress) -> WholeStress:
-    """Return a stress whose tractions lie in a file without a name, in place of memory.
-
-    Raises:
-        OSError: The folder of temporary files has no room.
-    """
-    with TemporaryFile() as file:
-        # A mapping that is written where the disk is full would end the process.
-        stress.tractions.tofile(file)
-        file.flush()
-        mapped = np.memmap(file, stress.tractions.dtype, "r", shape=stress.tractions.shape)
-        return WholeStress(mapped, stress.unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -384,7 +374,8 @@ class _Grid:
         """
         d = self.dimension
         pairs = component_pairs(d)
-        found = np.zeros((len(stresses), len(pairs), math.prod(self.shape)))
+        found = finished_fields((len(stresses), len(pairs), math.prod(self.shape)), self.shape)
+        found[:] = 0.0
         for load, stress in enumerate(stresses):
             for axis in range(d):
                 lower = self._lower(stress.tractions, axis).astype(float)
@@ -603,7 +594,8 @@ class _Hybrid:
             entries = np.diagonal(trace.T @ table.stiffness @ trace).reshape(-1, d)
             for corner, entry in enumerate(entries):
                 diagonal[grid.copies.copies[rows, corner]] += grid.shear[rows, np.newaxis] * entry
-        least = 0.03 * float(grid.shear.min()) / typical
+        # Slender ligaments bend by a thousandth of their material's stiffness.
+        least = 1e-3 * float(grid.shear.min()) / typical
         return cls(grid, faces, owned, total, blocks, inverse, diagonal, least)
 
     def uniform_moments(self, strain: Array) -> Array:

@@ -8,8 +8,10 @@ device, CuPy's.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from tempfile import TemporaryFile
 from types import ModuleType
 from typing import Any
 
@@ -20,12 +22,35 @@ from alphacut.base.errors import RefusedError, require
 from alphacut.base.extras import install_command
 from alphacut.rve.image.fields.element import Element
 from alphacut.rve.image.fields.kernels import apply_by_rows
+from alphacut.rve.image.memory import is_large
 
 SLAB_CELLS = 6144
 """Cells times fields that are worked on at once: what the second cache holds. More are slower."""
 
 Fields = Any
 """Array of NumPy or of a device."""
+
+
+def finished_fields(shape: tuple[int, ...], grid: Sequence[int], kind: type = float) -> Array:
+    """Return an array for fields that are solved one load after another, and then read once.
+
+    That of a large grid lies in a file without a name in the folder of temporary files, and its
+    pages take memory only while nothing else needs it.
+
+    Args:
+        shape: Its shape.
+        grid: Shape of the grid of the fields.
+        kind: Type of its numbers, of eight bytes.
+
+    Raises:
+        OSError: The folder has no room.
+    """
+    if not is_large(grid):
+        return np.empty(shape, kind)
+    with TemporaryFile() as file:
+        # A mapping that is written where the disk is full would end the process.
+        os.posix_fallocate(file.fileno(), 0, 8 * math.prod(shape))
+        return np.memmap(file, kind, "r+", shape=shape)
 
 
 def namespace(array: Fields) -> ModuleType:

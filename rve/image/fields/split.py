@@ -26,7 +26,7 @@ from alphacut.rve.image.fields.energy import (
     energies_of,
     solved_loads,
 )
-from alphacut.rve.image.fields.grid import SLAB_CELLS, Fields, Operator
+from alphacut.rve.image.fields.grid import SLAB_CELLS, Fields, Operator, finished_fields
 from alphacut.rve.image.fields.nodes import NodeCopies
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
 
@@ -226,7 +226,7 @@ def solve_beside_pores(
     inverse = FourierPreconditioner.of_material(element, constant, grid.shape)
     pairs = zip(element.parts, moduli, strict=True)
     uniform = sum(modulus.sum() * np.sum(modes[rows] ** 2, axis=0) for rows, modulus in pairs)
-    fields = np.zeros((len(loads), 1, len(grid.diagonal)))
+    fields = finished_fields((len(loads), 1, len(grid.diagonal)), grid.shape)
     for k in range(len(loads)):
         this = slice(k, k + 1)
         system = System(
@@ -241,7 +241,10 @@ def solve_beside_pores(
         if start is not None and start.shape == fields.shape:
             system = replace(system, start=np.tensordot(loads[this], start, axes=1))
         fields[this] = solver.solve(system)
-    fields = np.tensordot(np.linalg.inv(loads), fields, axes=1)
+    to_unit_loads = np.linalg.inv(loads)
+    for first in range(0, fields.shape[2], SLAB_CELLS):  # in place
+        part = slice(first, first + SLAB_CELLS)
+        fields[:, :, part] = np.tensordot(to_unit_loads, fields[:, :, part], axes=1)
     unit_modes = element.mean_modes(np.eye(len(loads)))
     regular = energies(element, grid.on_grid(fields), unit_modes, grid.regular.coefficients)
     beside = energies_of(

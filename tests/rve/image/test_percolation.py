@@ -7,6 +7,7 @@ from scipy.ndimage import gaussian_filter
 from alphacut.base.errors import FailedError
 from alphacut.fuzzy import Triangular
 from alphacut.rve import GreyImage, fuzzy_image_conductivity, solve_conduction, solve_image
+from alphacut.rve.image import memory
 from alphacut.rve.image.fields import equilibrium
 from alphacut.rve.image.fields import fluxes as of_fluxes
 from alphacut.rve.image.fields.equilibrium import solve_stresses
@@ -167,6 +168,17 @@ def test_fluxes_that_do_not_balance_are_an_error(monkeypatch, rng):
 # stiffness
 
 
+@pytest.mark.parametrize("soft", [0.0, 0.1])
+def test_fields_of_a_large_grid_wait_in_files_and_prove_the_same(soft, monkeypatch, rng):
+    stiffness = np.where(porous(rng, 5, porosity=0.3), 1.0, soft)
+    bounds = [solve_image(stiffness / 1.2, stiffness / 2.6)]
+    monkeypatch.setattr(memory, "IN_FILES", 1)
+    bounds.append(solve_image(stiffness / 1.2, stiffness / 2.6))
+    assert isinstance(bounds[1].upper.fields, np.memmap)
+    for end in ("lower", "upper"):
+        assert np.array_equal(*(getattr(x.bounds, end) for x in bounds))
+
+
 def moduli(phase, young, nu=0.3):
     """Bulk and shear modulus of each voxel; phase 0 is a pore."""
     stiffness = np.array([0.0, *young])[phase]
@@ -243,6 +255,36 @@ def test_lower_bounds_of_porous_volumes_rise_with_the_grid_below_the_upper_ones(
     assert np.linalg.eigvalsh(coarse.upper - fine.upper)[0] > -margin
     gaps = [np.trace(x.upper - x.lower) / np.trace(x.upper) for x in (coarse, fine)]
     assert gaps[1] < gaps[0] / 1.3
+
+
+SLENDER = """
+..##.#####.###..
+..############..
+..#.###.##..##..
+.##..##.....##..
+#######......###
+#######......###
+#######.....####
+#####.#....#####
+#.###.#..#######
+..#..##.########
+###......#######
+###..#...#######
+#######..#######
+######...#######
+.####....#####..
+.###..###..###..
+"""
+
+
+def test_slender_ligaments_carry_no_less_on_a_finer_grid():
+    """They are soft beside their material: the coarse system is solved for that."""
+    solid = np.array([[x == "#" for x in row] for row in SLENDER.split()]).astype(int)
+    lower = [
+        solve_image(*moduli(refined(solid, n).astype(int), (1.0,), -0.4011076)).bounds.lower
+        for n in (2, 4)
+    ]
+    assert (np.diag(lower[1]) > 0.99 * np.diag(lower[0])).all()
 
 
 @pytest.mark.parametrize("soft", [0.0, 1e-4])
