@@ -97,15 +97,15 @@ def solve_stresses(
     # What is finished waits in a file where it is large: a load takes 27 moments a voxel.
     finished = finished_fields((len(strains), len(grid.shear), d, d**2), grid.shape, int)
     stresses = []
-    for moments, strain in zip(finished, strains, strict=True):
+    for load, strain in enumerate(strains):
         tractions = hybrid.tractions(strain, solver)
         unit = unit_of(max(reference, abs(tractions).max())) * 2.0**10
         tractions /= unit
         whole = np.rint(tractions, out=tractions).astype(int)
         del tractions
         balanced = grid.balanced(whole, unit)
-        moments[:] = balanced.tractions
-        stresses.append(WholeStress(moments, balanced.unit))
+        finished[load] = balanced.tractions
+        stresses.append(WholeStress(finished[load], balanced.unit))
     means, energy = grid.means_and_energy(stresses)
     bound = bound_of_trials(means * scale[:, np.newaxis], energy)
     # Index k of Voigt's order is component `order[k]` of the grid's.

