@@ -63,9 +63,9 @@ mathjax2_config = {
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "imported-members": True}
-autodoc_type_aliases = {
-    name: name for name in ("Array", "Ints", "Mask", "Values")
-}  # not ndarray[tuple[…
+ALIASES = ("Array", "Ints", "Mask", "Values", "Outline", "LevelFunction", "Sampler", "Arrangement")
+"""Names of types that signatures show in place of what they stand for, as ndarray[tuple[…"""
+autodoc_type_aliases = {name: name for name in ALIASES}
 CONSTANTS = {
     "DISCS": "alphacut.stochastic.particles.shapes",
     "INTEGRATORS": "alphacut.frame.dynamics.integrators",
