@@ -65,6 +65,7 @@ lint:
 
 charts:
 	$(IN) python -m benchmarks.rve.one_shape
+	$(IN) python -m benchmarks.rve.mesh_bounds --seed 4131833150
 	$(IN) python -m benchmarks.rve.voxels --chart
 	$(IN) python -m benchmarks.frame.integrators
 	$(IN) python -m benchmarks.frame.envelopes
