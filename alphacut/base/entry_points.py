@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from functools import cache
 
+
+@cache
 def registered(group: str) -> dict[str, str]:
     """Return the places "module:name" that installed distributions register, by their names.
 

@@ -141,6 +141,11 @@ def _read_by_marks(
     for known in FORMATS:
         if known.has_marked(file):
             return known.read(file, unit)
+    # A table has no mark, and numbers in a head of another format may look like one.
+    for place in registered("alphacut.records").values():
+        further: RecordFormat = resolve_name(place)
+        if further.has_marked(file):
+            return further.read(file, unit)
     others = "COSMOS, CSMIP, GeoNet V2A, miniSEED, SAC, UFF 58, CSV"
     allowed = ", ".join([*(known.name for known in FORMATS), others])
     is_described = bool(channel or (step and unit))
@@ -154,10 +159,6 @@ def _read_by_marks(
         lost_head = is_named and begins_with_number and not (unit or channel)
         require(not lost_head, path.name, value, allowed, cure)
         return read_table(file, step, unit, channel, override)
-    for place in registered("alphacut.records").values():
-        further: RecordFormat = resolve_name(place)
-        if further.has_marked(file):
-            return further.read(file, unit)
     cure = "" if is_described else "numbers alone are read with records.step and records.unit"
     raise RefusedError(path.name, "of no format that is read", allowed, cure)
 
