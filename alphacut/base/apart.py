@@ -17,11 +17,12 @@ from contextlib import suppress
 from pathlib import Path
 from pkgutil import resolve_name
 from tempfile import TemporaryDirectory
-from typing import Any
+from threading import Thread
+from typing import TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 
+from alphacut.base.array_files import Numbers
 from alphacut.base.errors import RefusedError
 from alphacut.base.memory import free_memory
 
@@ -40,9 +41,21 @@ PROGRAM = (
 )
 
 
+class Order(TypedDict):
+    """What the process is to read, and its bounds; handed on as JSON."""
+
+    reader: str
+    path: str
+    options: dict[str, object]
+    folder: str
+    paths: list[str]
+    bytes: float
+    seconds: float
+
+
 def read_apart(
     reader: str, path: Path, *, library: str, options: Mapping[str, object] | None = None
-) -> dict[str, NDArray[Any]]:
+) -> dict[str, Numbers]:
     """Return what a function reads from a file, in a process of its own.
 
     Args:
@@ -59,7 +72,7 @@ def read_apart(
     size = path.stat().st_size
     seconds = MIN_SECONDS + SECONDS_PER_BYTE * size
     with TemporaryDirectory(prefix="alphacut-") as folder:
-        order = {
+        order: Order = {
             "reader": reader,
             "path": str(path.resolve()),
             "options": dict(options or {}),
@@ -67,21 +80,22 @@ def read_apart(
             "paths": [entry or os.getcwd() for entry in sys.path],
             "bytes": min(MIN_BYTES + BYTES_PER_BYTE * size, free_memory()),
             "seconds": seconds,
-            "parent": os.getpid(),
         }
         command = [sys.executable, "-I", "-S", "-c", PROGRAM, json.dumps(order)]
         environment = {k: x for k, x in os.environ.items() if not k.startswith(MPI)}
         environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         null = subprocess.DEVNULL
-        try:
-            # The process is killed where this one is interrupted.
-            ended = subprocess.run(
-                command, env=environment, stdin=null, stdout=null, stderr=null, check=False,
-                timeout=4 * seconds,
-            )  # fmt: skip
-            reason = f"{library} ended by signal {-ended.returncode}"
-        except subprocess.TimeoutExpired:
-            reason = f"{library} took more than {4 * seconds:.0f} s"
+        # It reads its input, of which nothing is written, to see that this process has ended.
+        with subprocess.Popen(
+            command, env=environment, stdin=subprocess.PIPE, stdout=null, stderr=null
+        ) as process:
+            try:
+                status = process.wait(4 * seconds)
+                reason = f"{library} ended by signal {-status}"
+            except subprocess.TimeoutExpired:
+                reason = f"{library} took more than {4 * seconds:.0f} s"
+            finally:
+                process.kill()  # also where this process is interrupted
         told = Path(folder, "told.json")
         if told.exists():
             reason = json.loads(told.read_text(encoding="utf-8"))
@@ -92,13 +106,14 @@ def read_apart(
         return {file.stem: np.load(file, allow_pickle=False) for file in files}
 
 
-def work(order: Mapping[str, Any]) -> None:
+def work(order: Order) -> None:
     """Read as `read_apart` asks, and leave arrays and the reason of a failure in its folder."""
+    Thread(target=_end_with_parent, daemon=True).start()
     _limit(order)
     folder = Path(order["folder"])
     reason = ""
     try:
-        read: Callable[..., Mapping[str, NDArray[Any]]] = resolve_name(order["reader"])
+        read: Callable[..., Mapping[str, Numbers]] = resolve_name(order["reader"])
         for name, array in read(Path(order["path"]), **order["options"]).items():
             np.save(folder / f"{name}.npy", array, allow_pickle=False)
     except MemoryError:
@@ -108,17 +123,17 @@ def work(order: Mapping[str, Any]) -> None:
     (folder / "told.json").write_text(json.dumps(reason), encoding="utf-8")
 
 
-def _limit(order: Mapping[str, Any]) -> None:
-    """Bound memory and time of this process, and let it end with the one that started it."""
-    with suppress(ImportError, OSError, ValueError):
-        import ctypes
-        import resource
-        import signal
+def _end_with_parent() -> None:
+    """End this process where the one that started it has ended, and its input with it."""
+    sys.stdin.buffer.read()
+    os._exit(1)
 
-        end_with_parent = 1  # PR_SET_PDEATHSIG
-        ctypes.CDLL(None).prctl(end_with_parent, signal.SIGKILL)
-        if os.getppid() != order["parent"]:  # it has ended before
-            os._exit(1)
+
+def _limit(order: Order) -> None:
+    """Bound memory and time of this process."""
+    with suppress(ImportError, OSError, ValueError):
+        import resource
+
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
         most = pages * os.sysconf("SC_PAGE_SIZE") + int(order["bytes"])
         resource.setrlimit(resource.RLIMIT_AS, (most, most))

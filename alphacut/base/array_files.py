@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +33,8 @@ def read_npy(path: Path, *, kinds: str = "buif") -> Numbers:
         OSError: The file cannot be opened.
     """
 
-    def load() -> Any:
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
+    def load() -> Numbers:
+        array: Numbers = np.load(path, mmap_mode="r", allow_pickle=False)
         size = path.stat().st_size
         fits = isinstance(array, np.memmap) and array.offset + array.nbytes == size
         value = f"of {size} bytes, where its head states shape {array.shape} of {array.dtype}"
@@ -76,7 +75,7 @@ def read_npz(path: Path, name: str, *, kinds: str = "buif") -> Numbers:
     """
     place = f"{path.name}:{name}"
 
-    def load() -> Any:
+    def load() -> Numbers:
         with np.load(path, allow_pickle=False) as archive:
             members = {x.filename.removesuffix(".npy"): x for x in archive.zip.infolist()}
             size = members[name].file_size
@@ -84,7 +83,7 @@ def read_npz(path: Path, name: str, *, kinds: str = "buif") -> Numbers:
             require_free_memory(place, 2.0 * size, f"{size} bytes")
             most = DEFLATE_RATIO * path.stat().st_size
             require(size <= most, place, f"of {size} bytes", f"up to {most}")
-            array = archive[name]
+            array: Numbers = archive[name]
         # NumPy pads the head to a multiple of 64 bytes, older ones of 16.
         is_whole = (size - array.nbytes) % 16 == 0
         require(is_whole, place, f"of {size} bytes for shape {array.shape}", "as many bytes")
@@ -93,7 +92,7 @@ def read_npz(path: Path, name: str, *, kinds: str = "buif") -> Numbers:
     return _checked(place, load, kinds=kinds)
 
 
-def _checked(place: str, load: Callable[[], Any], *, kinds: str) -> Numbers:
+def _checked(place: str, load: Callable[[], object], *, kinds: str) -> Numbers:
     """Return what a function loads, if it is an array of some kinds.
 
     Raises:
@@ -111,4 +110,5 @@ def _checked(place: str, load: Callable[[], Any], *, kinds: str) -> Numbers:
         raise RefusedError(place, f"unreadable ({reason})", allowed, cure) from None
     is_array = isinstance(array, np.ndarray) and array.dtype.kind in kinds
     require(is_array, place, f"{getattr(array, 'dtype', 'no array')}", allowed, cure)
-    return array  # type: ignore[no-any-return]
+    assert isinstance(array, np.ndarray)
+    return array

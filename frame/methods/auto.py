@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -75,7 +75,7 @@ class Auto:
     peaks: bool = False
     magnitudes: bool = False
     dual_first: bool = False
-    thresholds: tuple[Threshold, ...] = ()
+    thresholds: tuple[Threshold, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         if self.tolerance is not None:

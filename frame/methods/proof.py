@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import logging
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import comb
 from typing import ClassVar
 
@@ -83,7 +83,7 @@ class Proof:
     boxes: float = 4000
     parts: int = 16
     workers: int | None = None
-    thresholds: tuple[Threshold, ...] = ()
+    thresholds: tuple[Threshold, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         for key in ("gap", "tolerance", "boxes", "parts"):

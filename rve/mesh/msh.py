@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from alphacut.base.apart import read_apart
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError
 from alphacut.base.extras import extra_named
@@ -71,6 +70,8 @@ def read_msh(content: bytes) -> MshFile:
     with TemporaryDirectory(prefix="alphacut-") as folder:
         path = Path(folder, "mesh.msh")
         path.write_bytes(re.sub(rb"(?s)\$Periodic\s.*?\$EndPeriodic\s*", b"", content))
+        from alphacut.base.apart import read_apart  # which a cell without a file needs not
+
         read = read_apart("alphacut.rve.mesh.msh:arrays_of_gmsh", path, library="Gmsh")
     order = np.argsort(read["tags"], kind="stable")
     rising = read["tags"][order]
@@ -95,7 +96,8 @@ def read_msh(content: bytes) -> MshFile:
     names = dict(zip(groups, map(str, read["names"]), strict=True))
     entities = {int(entity) for entity in read["entities"]}
     dimension, partitions = (int(number) for number in read["numbers"])
-    return MshFile(read["points"], elements, kinds, groups, names, entities, partitions, dimension)
+    points = np.asarray(read["points"], float)
+    return MshFile(points, elements, kinds, groups, names, entities, partitions, dimension)
 
 
 def arrays_of_gmsh(path: Path) -> dict[str, NDArray[Any]]:

@@ -11,7 +11,7 @@ import pytest
 from alphacut import main
 from tests.environment.house import PACKAGES, files_in, tree
 
-ANY = 18  # public functions with Any, for FEniCSx, Gmsh and keywords of Matplotlib
+ANY = 19  # public functions with Any, for FEniCSx, Gmsh and keywords of Matplotlib
 
 
 def uses_any(node: ast.expr | None) -> bool:
