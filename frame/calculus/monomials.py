@@ -171,12 +171,11 @@ def convolve(
         inner = a.shape[-1]
     if max(len(a), len(b)) * out[0].size * inner <= few_multiplications:
         if bilinear == matmul and a.ndim == b.ndim == 3:
-            _add_matrix_products(_in_rows(a), _in_rows(b), at, out)
+            _add_by_parts(_add_matrix_products, a, b, at, out)
             return out
         if bilinear == np.multiply:
-            a_flat = _in_rows(_rows(a, shape))
-            b_flat = _in_rows(_rows(b, shape))
-            _add_products(a_flat, b_flat, at, out.reshape(len(out), -1))
+            flat = out.reshape(len(out), -1)
+            _add_by_parts(_add_products, _rows(a, shape), _rows(b, shape), at, flat)
             return out
     # Each coefficient of the shorter factor is multiplied by all of the longer one. Their products
     # have different places, since x y = x z only if y = z: so the sum by indices misses none.
@@ -187,6 +186,30 @@ def convolve(
         for y in np.flatnonzero(b.reshape(len(b), -1).any(1)):
             out[at[:, y]] += bilinear(a, b[y][None])
     return out
+
+
+def _add_by_parts(
+    add: Callable[[Array, Array, Ints, Array], None], a: Array, b: Array, at: Ints, out: Array
+) -> None:
+    """Add products by a kernel of real numbers, once for each pair of real and imaginary parts.
+
+    So one kernel is compiled, where another one of complex numbers would take as long again.
+
+    Args:
+        add: `_add_products` or `_add_matrix_products`.
+        a: Coefficients of the first factor, real or complex.
+        b: Those of the second one.
+        at: Place of each product.
+        out: Sums of products, complex if a or b is; changed.
+    """
+    if not np.iscomplexobj(out):
+        add(_in_rows(a), _in_rows(b), at, out)
+        return
+    for i, x in enumerate((a.real, a.imag) if np.iscomplexobj(a) else (a,)):
+        for j, y in enumerate((b.real, b.imag) if np.iscomplexobj(b) else (b,)):
+            products = np.zeros(out.shape)
+            add(_in_rows(x), _in_rows(y), at, products)
+            out += 1j ** (i + j) * products
 
 
 def _in_rows(a: Array) -> Array:
