@@ -229,7 +229,14 @@ def classical_trajectory(
     ends = last_quarter + slopes * (h / 4)
     of_loads = to_modes @ pushes.value
     outputs = np.empty((len(sigma), len(time), at_outputs.shape[1]))
-    _march_modes(sigma, h, intervals, start, of_loads, ends, slopes, at_outputs, outputs)
+    integrals = np.zeros((*sigma.shape, 4), complex)
+    if loads:  # else nothing is compiled for them
+        for place in np.ndindex(*sigma.shape):
+            step_integrals(sigma[place], h, integrals[place])
+    by_end = of_loads * integrals[..., :1]
+    by_slope = -of_loads * integrals[..., 1:2]
+    factor = np.exp(sigma * h)
+    _march_modes(factor, intervals, start, by_end, by_slope, ends, slopes, at_outputs, outputs)
     return outputs
 
 
@@ -264,11 +271,11 @@ def _is_linear(load: History, interval: float) -> bool:
 
 @compiled
 def _march_modes(
-    sigma: Array,
-    h: float,
+    factor: Array,
     intervals: int,
     start: Array,
-    moved: Array,
+    by_end: Array,
+    by_slope: Array,
     ends: Array,
     slopes: Array,
     read: Array,
@@ -282,32 +289,22 @@ def _march_modes(
     interval.
 
     Args:
-        sigma: Complex σ of n modes at S parameter sets, shape (S, n).
-        h: Length of an interval, in s.
+        factor: exp(σ h) of n modes at S parameter sets, complex, shape (S, n).
         intervals: Number of intervals in a step, from one time node to the next.
         start: Complex z at t = 0, shape (S, n).
-        moved: ΦᵀM b, what a unit of each load adds to ż, shape (S, n, L).
+        by_end: moved times J₀, where moved is ΦᵀM b, what a unit of each of L loads adds to ż,
+            shape (S, n, L).
+        by_slope: moved times −J₁, of the same shape.
         ends: Values of the loads at the ends of the intervals, shape (intervals in all steps, L).
         slopes: Slopes of the loads in the intervals, of the same shape.
         read: Complex output rows times mode shapes, shape (S, outputs, n).
         out: Receives the outputs, shape (S, time nodes, outputs).
     """
     samples, n_nodes, m = out.shape
-    n = sigma.shape[1]
-    n_loads = moved.shape[2]
-    integrals = np.empty(4, np.complex128)
-    factor = np.empty(n, np.complex128)
-    by_end = np.empty((n_loads, n), np.complex128)
-    by_slope = np.empty((n_loads, n), np.complex128)
+    n, n_loads = by_end.shape[1:]
     real = np.empty(n)
     imaginary = np.empty(n)
     for s in range(samples):
-        for k in range(n):
-            step_integrals(sigma[s, k], h, integrals)
-            factor[k] = np.exp(sigma[s, k] * h)
-            for load in range(n_loads):
-                by_end[load, k] = moved[s, k, load] * integrals[0]
-                by_slope[load, k] = -moved[s, k, load] * integrals[1]
         for k in range(n):
             real[k] = start[s, k].real
             imaginary[k] = start[s, k].imag
@@ -315,14 +312,16 @@ def _march_modes(
             for i in range((node - 1) * intervals if node else 0, node * intervals):
                 for k in range(n):
                     before = real[k]
-                    real[k] = factor[k].real * before - factor[k].imag * imaginary[k]
-                    imaginary[k] = factor[k].real * imaginary[k] + factor[k].imag * before
+                    w = factor[s, k]
+                    real[k] = w.real * before - w.imag * imaginary[k]
+                    imaginary[k] = w.real * imaginary[k] + w.imag * before
                 for load in range(n_loads):
                     a = ends[i, load]
                     slope = slopes[i, load]
                     for k in range(n):
-                        real[k] += a * by_end[load, k].real + slope * by_slope[load, k].real
-                        imaginary[k] += a * by_end[load, k].imag + slope * by_slope[load, k].imag
+                        change = a * by_end[s, k, load] + slope * by_slope[s, k, load]
+                        real[k] += change.real
+                        imaginary[k] += change.imag
             for o in range(m):
                 total = 0.0
                 for k in range(n):
