@@ -209,7 +209,7 @@ def _add_by_parts(
         for j, y in enumerate((b.real, b.imag) if np.iscomplexobj(b) else (b,)):
             products = np.zeros(out.shape)
             add(_in_rows(x), _in_rows(y), at, products)
-            out += 1j ** (i + j) * products
+            np.add(out, 1j ** (i + j) * products, out=out)
 
 
 def _in_rows(a: Array) -> Array:
