@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache, partial, update_wrapper
 from hashlib import sha256
@@ -33,6 +33,10 @@ before_compiling = list[Callable[[], None]]()
 prange = range
 """The loop of parallel kernels, until Numba is imported and its own prange takes its place."""
 _creation_lock = RLock()
+_known_types = set[bytes]()
+"""Types of tuples and Booleans that Numba has met as arguments of kernels, as its fingerprints."""
+_first_calls = RLock()
+"""Held during calls that bring a type of tuple or Boolean which Numba has not met."""
 
 
 class _Kernel:
@@ -51,8 +55,21 @@ class _Kernel:
         with_kernels.add(function.__module__)
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call the compiled function."""
-        return self._dispatcher(*arguments)
+        """Call the compiled function.
+
+        At each call Numba looks the types of the arguments up in a table of the process, to which
+        tuples and Booleans of a new type are added. Debian's build of Numba 0.61 ends the process
+        where two threads add the same type at once ("_hashtable.cpp … Assertion `entry == NULL'
+        failed"); other builds drop the assertion. So calls with a new type wait for each other.
+        """
+        dispatcher = self._dispatcher
+        types = _fingerprints(arguments)
+        if types <= _known_types:
+            return dispatcher(*arguments)
+        with _first_calls:
+            found = dispatcher(*arguments)
+            _known_types.update(types)
+        return found
 
     @property
     def _dispatcher(self) -> Any:
@@ -100,6 +117,16 @@ class _Kernel:
     def __reduce__(self) -> str:
         """Pickle the kernel as the global of its name."""
         return str(self.__qualname__)
+
+
+def _fingerprints(arguments: Iterable[object]) -> set[bytes]:
+    """Return Numba's fingerprints of the types of the tuples and Booleans among arguments."""
+    tabulated = [argument for argument in arguments if isinstance(argument, tuple | bool)]
+    if not tabulated:
+        return set()
+    from numba._dispatcher import compute_fingerprint
+
+    return {compute_fingerprint(argument) for argument in tabulated}
 
 
 def _announced(compile_types: Callable[..., Any]) -> Callable[..., Any]:

@@ -107,9 +107,6 @@ class BoxProof(Protocol):
     def peak_gap(self, flow: UnitFlow) -> Array:
         """Return the wanted gap of the outputs' peaks, shape (m,), in their units."""
 
-    def call_kernels(self) -> None:
-        """Call the compiled kernels of `bounds` that take tuples once; see `KernelThreads`."""
-
     def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> Sequence[Answer]:
         """Return the bounds on each level of a sub-box, or the refusal of that level.
 

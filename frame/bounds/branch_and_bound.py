@@ -16,6 +16,7 @@ time.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -24,13 +25,11 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.progress_bar import Progress
-from alphacut.base.threads import KernelThreads
 from alphacut.frame.bounds.kernel import (
     FACES,
     BoxTables,
     Examination,
     Items,
-    call_examine,
     examine,
 )
 from alphacut.frame.bounds.remainders import remainder_bounds
@@ -84,7 +83,7 @@ def bound_problems(
     examined = 0
     # Bounds over the undivided box: outputs at rest have 0 there, below optimum + gap.
     undivided: Array = np.full(n_problems, np.inf)
-    with KernelThreads(workers, call_examine) as pool:
+    with ThreadPoolExecutor(workers) as pool:
         while len(frontier) and examined + len(frontier) <= budget * n_problems:
             is_undivided = examined == 0
             examined += len(frontier)

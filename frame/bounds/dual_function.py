@@ -65,15 +65,6 @@ class DualFunctionData(NamedTuple):
     multiplier_spacing: Array  # distance of the values that multipliers take, (1,)
 
 
-def data_without_modes() -> DualFunctionData:
-    """Return data of empty arrays, with which a kernel can be called before there are models."""
-    dimensions = dict.fromkeys(DualFunctionData._fields, 2)
-    dimensions["table"] = 4
-    for name in ("grid_points", "expected_cubic", "remainder", "multiplier_spacing"):
-        dimensions[name] = 1
-    return DualFunctionData(**{name: np.zeros((0,) * count) for name, count in dimensions.items()})
-
-
 def require_in_range(fields: Mapping[str, Array]) -> None:
     """Raise UnprovedError where a number of models or tables is not finite or above `LARGEST`."""
     for name, values in fields.items():

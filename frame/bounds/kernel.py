@@ -349,20 +349,3 @@ def examine(
                 allowed = aim - value[item] - missing
                 if not stays_below(g, H, r, allowed, work, factor):
                     code[item] = bisection_code(bend, slope_error, r)
-
-
-def call_examine() -> None:
-    """Call `examine` once without a sub-box, so that Numba knows the types of its arguments.
-
-    Threads that call a kernel for the first time at once may end the process in some builds of
-    Numba; the pool of threads makes this call before it has a thread.
-    """
-    none = np.zeros(0, np.int64)
-    items = Items(first_row=none, first_item=none, node=none, column=none)
-    boxes = BoxTables(
-        radius=np.zeros((0, 0)),
-        is_outer=np.zeros((0, 2, 0), np.bool_),
-        factors=np.zeros((0, 0, 0, 0)),
-    )
-    third = np.zeros((0,) * 5)
-    examine(items, boxes, np.zeros((0, 0)), third, np.zeros(0), Examination.none(0))

@@ -19,7 +19,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.kernels import compiled
 from alphacut.frame import numbers
-from alphacut.frame.bounds.dual_function import DualFunctionData, data_without_modes, minimise
+from alphacut.frame.bounds.dual_function import DualFunctionData, minimise
 from alphacut.frame.bounds.level import LevelModels, OutputBounds
 
 
@@ -156,18 +156,6 @@ def _bound_cell(
             largest_node = node
             at[:] = u
     return largest, largest_node
-
-
-def call_bound_cell() -> None:
-    """Call the kernel of `least_peak` once without a mode, so that Numba knows its argument types.
-
-    Threads that call a kernel for the first time at once may end the process in some builds of
-    Numba.
-    """
-    data = data_without_modes()
-    none = np.zeros((0, 0))
-    no_ends = np.zeros((0, 4), np.int64)
-    _bound_cell(no_ends, (data, data), none, CellEffort(0, 0, 0), none, np.zeros(0))
 
 
 def _halves(cell: PeakCell, data: DualFunctionData) -> tuple[Ints, Ints] | None:

@@ -16,7 +16,6 @@ from alphacut.base.kernels import compiled
 from alphacut.frame.bounds.dual_function import (
     DualFunctionData,
     add,
-    data_without_modes,
     dot,
     loops,
     minimise,
@@ -122,30 +121,6 @@ def bound_nodes(
         out[0, j] = cells.value[:count].max() + constant[0] + constant[1]
         out[1, j] = model_value + constant[0]
         at[j] = u
-
-
-def call_bound_nodes() -> None:
-    """Call `bound_nodes` once without a node, so that Numba knows the types of its arguments.
-
-    Threads that call a kernel for the first time at once may end the process in some builds of
-    Numba; the pool of threads makes this call before it has a thread.
-    """
-    none = np.zeros((2, 0))
-    effort = Effort(
-        cells=0,
-        steps=0,
-        slack_below_peak=0.0,
-        remainder_multiple=0.0,
-        wanted_gap=0.0,
-        incumbent=0.0,
-        patience=0,
-        ascents=0,
-        grace=0,
-        min_progress=0.0,
-    )
-    no_nodes = np.zeros(0, np.int64)
-    no_inputs = np.zeros((0, 0))
-    bound_nodes(no_nodes, 1.0, effort, none, data_without_modes(), none, no_inputs)
 
 
 @compiled

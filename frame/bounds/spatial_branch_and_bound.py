@@ -11,6 +11,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from heapq import heappop, heappush
@@ -19,7 +20,6 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.progress_bar import Progress
-from alphacut.base.threads import KernelThreads
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box_proof import (
     ROUNDING_MARGIN,
@@ -173,7 +173,7 @@ class Queue:
             UnprovedError: The proof refuses too many sub-boxes, or one that bisections would not
                 help.
         """
-        pool = KernelThreads(self.workers, self.proof.call_kernels)
+        pool = ThreadPoolExecutor(self.workers)
         try:
             while batch := self._next_batch():
                 tick = partial(self._report, progress, batch)

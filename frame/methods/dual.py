@@ -9,7 +9,7 @@ nodes, and hardly depends on the number of inputs.
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
@@ -19,19 +19,16 @@ import numpy as np
 from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import checked_number
 from alphacut.base.progress_bar import Progress, nth_subprogress, subprogress
-from alphacut.base.threads import KernelThreads
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box import Box
 from alphacut.frame.bounds.box_proof import Answer, BoxBounds, Goal, PrunedPeaks
-from alphacut.frame.bounds.least_peaks import call_bound_cell, least_peak
+from alphacut.frame.bounds.least_peaks import least_peak
 from alphacut.frame.bounds.level import LevelModels, OutputBounds, improve_all
-from alphacut.frame.bounds.node_bounds import call_bound_nodes
 from alphacut.frame.bounds.pruning import prune_ends, remainder_addition
 from alphacut.frame.bounds.spatial_branch_and_bound import halvings, prove
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.response.duhamel import call_with_load
 from alphacut.frame.result import Ends, Envelope
 from alphacut.frame.structures.linear import frequencies
 from alphacut.frame.verification.rounding import rounding_margin
@@ -135,12 +132,6 @@ class DualProof:
                 work *= DAMPED_WORK
         return work
 
-    def call_kernels(self) -> None:
-        """Call the compiled kernels of `bounds` that take tuples once; see `KernelThreads`."""
-        call_with_load()
-        call_bound_nodes()
-        call_bound_cell()
-
     def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[Answer]:
         """Return bounds on each level of a box, or the error of a level that cannot be bounded.
 
@@ -208,7 +199,7 @@ class DualProof:
             problems[o, s] = problem
 
         tick = nth_subprogress(goal.tick, k, len(goal.needed))
-        with KernelThreads(goal.workers, self.call_kernels) as pool:
+        with ThreadPoolExecutor(goal.workers) as pool:
             # 1. Find multipliers with low bounds, and inputs with large values of the models.
             if is_complete:
                 self._minimise(problems, goal, flow, box, pool, progress=tick)

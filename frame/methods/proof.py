@@ -28,7 +28,6 @@ from alphacut.base.progress_bar import Progress
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds, Goal
 from alphacut.frame.bounds.branch_and_bound import Optima, bound_problems, first_optima
-from alphacut.frame.bounds.kernel import call_examine
 from alphacut.frame.bounds.remainders import remainder_bounds
 from alphacut.frame.bounds.spatial_branch_and_bound import prove
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, MAX_PARAMETERS, Boxes, UnitFlow
@@ -43,7 +42,6 @@ from alphacut.frame.modes.model_error import (
     error_fractions,
     proved_error,
 )
-from alphacut.frame.response.duhamel import call_with_load
 from alphacut.frame.result import Envelope
 from alphacut.frame.threshold import Threshold
 from alphacut.frame.verification.rounding import rounding_margin
@@ -156,11 +154,6 @@ class Proof:
         # One more input multiplies the boxes of a branch and bound by about 4 (measured). A larger
         # factor would prefer the dual bound, whose work is compared with this.
         return float(4.0**n_inputs)
-
-    def call_kernels(self) -> None:
-        """Call the compiled kernels of `bounds` that take tuples once; see `KernelThreads`."""
-        call_with_load()
-        call_examine()
 
     def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[BoxBounds]:
         """Return guaranteed bounds and attained values on each level of a sub-box.

@@ -33,7 +33,7 @@ from alphacut.base.arrays import Array, Ints
 from alphacut.base.kernels import compiled, kernel, prange
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.records.history import Accelerogram, History
+from alphacut.frame.records.history import History
 
 parallel = kernel(parallel=True)
 PARALLEL_LOOP = Lock()
@@ -45,9 +45,7 @@ MAX_PHASE = 1e8
 
 Orders = Array
 """An empty array whose number of dimensions says how many orders of derivatives are wanted, order 0
-included. Numba knows this number when it compiles a kernel, as it knows the length of a tuple. In
-contrast to a tuple, an array may be passed by a thread that calls the kernel for the first time;
-see `KernelThreads`."""
+included. Numba knows this number when it compiles a kernel, as it knows the length of a tuple."""
 
 
 class LinearPieces(NamedTuple):
@@ -131,16 +129,6 @@ def absolute_moments(decay: float, history: History, time: Array) -> Array:
     out: Array = np.empty((5, len(time)))
     _absolute_moments(load, load.offsets[load.offset], decay, out)
     return out
-
-
-def call_with_load() -> None:
-    """Call a kernel that takes a load once, before there are threads; see `KernelThreads`."""
-    _take_load(linear_pieces(Accelerogram(1.0, np.zeros(2)), np.ones(1)))
-
-
-@compiled
-def _take_load(load: LinearPieces) -> None:
-    """Do nothing; at the first call Numba adds the type of a load to its table."""
 
 
 @compiled

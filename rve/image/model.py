@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from functools import partial
 from threading import Event
 from typing import Any, ClassVar, Generic, TypedDict, TypeVar, Unpack
 
@@ -13,7 +13,6 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import FailedError, require
 from alphacut.base.progress_bar import Progress
-from alphacut.base.threads import KernelThreads
 from alphacut.rve.image.bounds import (
     ConductivityBounds,
     Enclosure,
@@ -170,7 +169,8 @@ class GridModel(Generic[Bounds]):
             workers = 1
         if dimension == 2 or self.device != "cpu":
             elements = []  # without kernels
-        with KernelThreads(workers, partial(call_kernels, elements)) as pool:
+        call_kernels(elements)
+        with ThreadPoolExecutor(workers) as pool:
             try:
                 lower, upper = pool.map(solve, (True, False), guesses)
             finally:  # Ctrl-C and errors are not to wait for the other side

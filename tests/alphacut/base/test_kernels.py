@@ -9,8 +9,12 @@ import re
 import shutil
 import subprocess
 import sys
+from collections import namedtuple
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Barrier, BrokenBarrierError
 
+import numpy as np
 import pytest
 
 from alphacut.base import kernels
@@ -194,3 +198,25 @@ def test_kernels_that_python_calls_return_numbers_or_tuples_of_numbers() -> None
     not_allowed = named_tuples | {"Array", "Ints", "Mask"}
     wrong = {name: returned[name] & not_allowed for name in of_python}
     assert {name: kinds for name, kinds in wrong.items() if kinds} == {}
+
+
+def test_threads_bring_a_new_type_of_argument_one_after_the_other(monkeypatch) -> None:
+    """Debian's Numba ends the process where two threads bring the same new type at once."""
+    met = Barrier(2)
+
+    def call(*arguments: object) -> bool:
+        """Return whether another thread is within this call, too."""
+        try:
+            met.wait(0.3)
+        except BrokenBarrierError:
+            met.reset()
+            return False
+        return True
+
+    kernel = kernels.compiled(lambda: None)
+    monkeypatch.setattr(kernel, "_created", call)
+    pair = namedtuple("pair", "x y")(np.zeros(2), 1)
+    with ThreadPoolExecutor(2) as pool:
+        assert list(pool.map(kernel, [pair] * 2)) == [False, False]
+        assert list(pool.map(kernel, [pair] * 2)) == [True, True]
+        assert list(pool.map(kernel, [True, np.zeros(1)])) == [True, True]

@@ -556,9 +556,6 @@ class Lipschitz:
     def peak_gap(self, flow):
         return self.gap * flow.peak
 
-    def call_kernels(self):
-        """No kernel is called."""
-
     def bounds(self, flow, cuts, goal):
         self.seen.append((cuts, goal.needed.copy()))
         place = 0 if self.along is None else self.along
