@@ -96,31 +96,35 @@ def read_apart(
                 reason = f"{library} took more than {4 * seconds:.0f} s"
             finally:
                 process.kill()  # also where this process is interrupted
+        allowed = cure = ""
         told = Path(folder, "told.json")
         if told.exists():
-            reason = json.loads(told.read_text(encoding="utf-8"))
+            reason, allowed, cure = json.loads(told.read_text(encoding="utf-8"))
         if reason:
-            cure = "write the file anew, or copy it anew"
-            raise RefusedError(path.name, reason, f"a file that {library} reads", cure)
+            allowed = allowed or f"a file that {library} reads"
+            cure = cure or "write the file anew, or copy it anew"
+            raise RefusedError(path.name, reason, allowed, cure)
         files = Path(folder).glob("*.npy")
         return {file.stem: np.load(file, allow_pickle=False) for file in files}
 
 
 def work(order: Order) -> None:
-    """Read as `read_apart` asks, and leave arrays and the reason of a failure in its folder."""
+    """Read as `read_apart` asks; leave arrays, or why not, what is allowed and the cure."""
     Thread(target=_end_with_parent, daemon=True).start()
     _limit(order)
     folder = Path(order["folder"])
-    reason = ""
+    told = ["", "", ""]
     try:
         read: Callable[..., Mapping[str, Numbers]] = resolve_name(order["reader"])
         for name, array in read(Path(order["path"]), **order["options"]).items():
             np.save(folder / f"{name}.npy", array, allow_pickle=False)
     except MemoryError:
-        reason = "too large: the memory that its size allows is not enough"
+        told[0] = "too large: the memory that its size allows is not enough"
+    except RefusedError as error:
+        told = [str(error.value), error.allowed, error.cure]
     except Exception as error:  # of libraries, errors of all kinds
-        reason = " ".join(str(error).split())[:150] or type(error).__name__
-    (folder / "told.json").write_text(json.dumps(reason), encoding="utf-8")
+        told[0] = " ".join(str(error).split())[:150] or type(error).__name__
+    (folder / "told.json").write_text(json.dumps(told), encoding="utf-8")
 
 
 def _end_with_parent() -> None:

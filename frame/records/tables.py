@@ -31,6 +31,7 @@ from alphacut.frame.records.text_file import (
     read_bytes,
     recording_in_si,
     require_step,
+    words_of,
 )
 from alphacut.frame.records.units import (
     NEWTONS,
@@ -126,16 +127,13 @@ class _Table:
         first = next((k for k in plain if is_row(file.lines[k])), len(file.lines))
         rows = {k: file.lines[k] for k in plain if k >= first}
         texts = tuple(k for k in lines if k not in rows)
-        # Where a line gives the format of numbers that touch, their columns are fixed.
-        layouts = [re.search(r"\b\d*[EFG](\d+)\.\d+\b", file.lines[k], re.I) for k in texts]
-        layout = next(filter(None, layouts), None)
         divide = _divider(list(rows.values()))
         cells = {k: divide(text) for k, text in rows.items()}
+        # Where a line gives the format of numbers that touch, their columns are fixed.
+        above_rows = "\n".join(file.lines[k] for k in texts)
+        layout = re.search(r"\b\d*[EFG](\d+)\.\d+\b", above_rows, re.IGNORECASE)
         if layout and any(re.fullmatch(_TOUCHING, x) for row in cells.values() for x in row):
-            width = int(layout[1])
-            for k, text in rows.items():
-                words = [text[i : i + width] for i in range(0, len(text.rstrip()), width)]
-                cells[k] = [word.strip() for word in words]
+            cells = {k: words_of(text, int(layout[1])) for k, text in rows.items()}
         n_columns = len(cells[first]) if cells else 0
         above = [k for k in plain if k < first][-2:]
         is_plain = bool(above)
@@ -149,10 +147,14 @@ class _Table:
         return cls(file, texts, heads, columns, cells)
 
     @property
+    def titles(self) -> list[int]:
+        """Those of `texts` that are no comments."""
+        return [k for k in self.texts if not re.match(_COMMENT, self.file.lines[k])]
+
+    @property
     def start(self) -> int:
         """The line that messages on the head name: the first that is no comment."""
-        plain = [k for k in self.texts if not re.match(_COMMENT, self.file.lines[k])]
-        return min([*plain, *list(self.rows)[:1]], default=0)
+        return min([*self.titles, *list(self.rows)[:1]], default=0)
 
     @property
     def width(self) -> int:
@@ -257,19 +259,23 @@ def _columns_of(lines: Sequence[str], count: int) -> tuple[list[_Column], int]:
     """Return name and unit of each column from the last lines above the numbers, at most two.
 
     Loggers write the names of columns in one line and their units, with or without brackets, in the
-    next: "time,acc" and "s,g". There are no columns where the last line has another number of cells
-    than there are columns, or is a title of two words.
+    next: "time,acc" and "s,g". There are no columns where the last line is a title of two words, or
+    has another number of cells than there are columns and does not begin with times.
 
     Returns:
         The columns, and how many of the lines name them.
     """
-    cells = _cells_of_head(lines[-1] if lines else "", count)
+    last = lines[-1] if lines else ""
+    cells = _cells_of_head(last, count)
     if not cells:
-        return [], 0
+        # One that begins with times has a cell for each column, or the rows are wrong.
+        cells = re.split("[,;\t]", last)
+        if len(cells) == 1 or not _Column.of(cells[0]).is_time:
+            return [], 0
     units = [cell.strip(' "[]()') for cell in cells]
     if all(acceleration_factor(x) or seconds_of(x) or other_quantity(x) for x in units):
-        names = _cells_of_head(lines[0], count) if len(lines) > 1 else []
-        pairs = zip(names or [""] * count, units, strict=True)
+        names = _cells_of_head(lines[0], len(cells)) if len(lines) > 1 else []
+        pairs = zip(names or [""] * len(cells), units, strict=True)
         return [_Column(name.strip(' "').lower(), unit) for name, unit in pairs], len(lines)
     columns = [_Column.of(cell) for cell in cells]
     is_parted = count > 2 or re.search("[,;\t]", lines[-1]) is not None
@@ -312,26 +318,22 @@ def _table_of(file: TextFile) -> _Table:
 def is_table(file: TextFile, *, is_described: bool = False) -> bool:
     """Return whether a file is a table of numbers, such as one in CSV.
 
-    It is one if its columns are named and the first has times, or if a line above the numbers
-    begins so. Otherwise the last row must be numbers, and there must be one or two of them, or no
-    line above the numbers, or a description by the user or by these lines.
+    Above its rows, which begin with numbers, a line names the columns, begins with times, or states
+    unit or step; or there are one or two columns, or no lines but comments, or the user describes
+    the numbers.
 
     Args:
-        file: The file. Comments do not count.
+        file: The file.
         is_described: Whether the user says how to read the numbers: a channel, or step and unit.
     """
     table = _table_of(file)
-    plain = [file.lines[k] for k in table.texts if not re.match(_COMMENT, file.lines[k])]
-    is_headed = re.match(r"\W*(?:time|t|date|timestamp)\b", (plain or [""])[-1], re.I) is not None
-    if table.rows and (is_headed or (table.heads and table.columns[0].is_time)):
-        return True
-    last_row = list(table.rows.values())[-1:]
-    is_row = any(
-        all(NUMBER.fullmatch(x) or re.fullmatch(_TOUCHING, x) for x in cells) for cells in last_row
-    )
-    found = TextStatements.of(file, table.texts)
-    is_stated = bool(found.units or found.peak_units or found.steps)
-    return is_row and (is_described or not plain or len(last_row[0]) < 3 or is_stated)
+    is_known = is_described or bool(table.heads) or table.width < 3 or not table.titles
+    title = file.lines[table.titles[-1]] if table.titles else ""
+    is_known = is_known or re.match(r"\W*(?:time|t|date)\b", title, re.IGNORECASE) is not None
+    if table.rows and not is_known:
+        found = TextStatements.of(file, table.texts)
+        is_known = bool(found.units or found.peak_units or found.steps)
+    return bool(table.rows) and is_known
 
 
 def read_table(
@@ -381,11 +383,12 @@ def read_table(
         found.steps.append(Stated(float(first_row[1]), f"{first_row[1]} s", line))
     else:
         is_head = False
-        _require_cell_of_each_head(table)
-    are_pairs = table.width == 2 and step is None
-    if are_pairs and acceleration_factor(table.columns[0].unit) is not None:
-        are_pairs = table.columns[1].is_time  # else two components
-    has_times = not is_head and (table.has_times or are_pairs)
+    if table.heads:
+        table.numbers(list(table.rows)[:1])  # names a row of another count of cells
+    # Of two columns the first has times, unless both are components.
+    are_components = acceleration_factor(table.columns[0].unit) and not table.columns[-1].is_time
+    is_pair = table.width == 2 and step is None and not are_components
+    has_times = not is_head and (table.has_times or is_pair)
     known_step = None
     if not has_times:
         known_step = settled(place, "step", found.steps, said_step, override=override)
@@ -424,14 +427,6 @@ def read_table(
         tuple(filter(None, remarks)),
         stated=() if "unit" in override else peaks_in_text(lines, own_unit.text),
     )
-
-
-def _require_cell_of_each_head(table: _Table) -> None:
-    """Raise RefusedError if a head that begins with times has another count of cells than rows."""
-    plain = [table.file.lines[k] for k in table.texts]
-    cells = re.split("[,;\t]", (plain or [""])[-1])
-    if not table.heads and table.rows and len(cells) > 1 and _Column.of(cells[0]).is_time:
-        raise _wrong_row(table, next(iter(table.rows)), expected=len(cells))
 
 
 def _choose_column(table: _Table, channel: str, *, has_times: bool) -> int:
@@ -492,10 +487,10 @@ def _unit_of(
     if not own:
         found.units += of_heads.units
     label = column
-    plain = [file.lines[k] for k in table.texts if not re.match(_COMMENT, file.lines[k])]
-    if table.width == 1 and plain and not found.units:
-        label = _Column.of(plain[-1])
-        is_unit = "[" in plain[-1] or "/" in label.unit
+    if table.width == 1 and table.titles and not found.units:
+        title = file.lines[table.titles[-1]]
+        label = _Column.of(title)
+        is_unit = "[" in title or "/" in label.unit
         if label.is_time or not is_unit or acceleration_factor(label.unit) is not None:
             label = _Column(label.name)
     named = named_quantity(label.name)
@@ -559,12 +554,7 @@ def _step_of_times(
     other = settled(place, "step", found.steps, said, override=override, tolerance=0.05)
     steps = _even_steps(table, factor, other.value if other else None)
     remarks += filter(None, [steps.remark])
-    is_count = steps.step == factor and steps.first in (0, factor)
-    if is_count and other is not None:
-        return other, ["its times count the samples: the stated step is taken"]
-    cure = "mend the head of the times"
-    if is_count:
-        cure = "times that count the samples do not tell their step: say records.step"
+    cure = "mend the head of the times; if they count the samples, say records.step"
     require_step(place, steps.step, cure)
     if abs(steps.first) > MAX_UNEVENNESS * steps.step:
         remarks.append(f"its times begin at {steps.first:g} s, taken as 0")
@@ -592,8 +582,8 @@ def _even_steps(table: _Table, factor: float, stated_step: float | None = None) 
         table: The table. Its times are numbers.
         factor: Their unit in s.
         stated_step: Step that user or file state, in s. It is taken where the times do not tell it:
-            if all are equal, or if they were rounded so coarsely that even steps look uneven. Then
-            it must agree with the duration to the last digit of the times.
+            if they count the samples from 0 or 1 on, or were rounded so coarsely that even steps
+            look uneven. Then it must agree with the duration to the last digit of the times.
 
     Raises:
         RefusedError: The times do not rise in even steps, and `stated_step` is missing or does not
@@ -605,9 +595,6 @@ def _even_steps(table: _Table, factor: float, stated_step: float | None = None) 
     first = float(time[0])
     duration = float(time[-1]) - first
     n_steps = len(time) - 1
-    if (time == first).all() and stated_step is not None:
-        remark = "its times are all equal: the stated step is taken"
-        return _EvenSteps(stated_step, 0.0, remark, is_stated=True)
     even: Array = np.asarray(np.linspace(first, time[-1], len(time)), float)
     # The step is the mean, and times are compared with even ones. Differences of neighbours would
     # not do: those of times such as 1.7e9 s, from 1970 on, have lost the digits of the step.
@@ -615,6 +602,9 @@ def _even_steps(table: _Table, factor: float, stated_step: float | None = None) 
     last_digit = factor * _resolution([cells[0] for cells in table.rows.values()])
     deviations = np.abs(time - even)
     unevenness = float(deviations.max())
+    if stated_step and step == factor and first in (0, factor):
+        remark = "its times count the samples: the stated step is taken"
+        return _EvenSteps(stated_step, 0.0, remark, is_stated=True)
     if step > 0 and unevenness <= MAX_UNEVENNESS * step:
         # Beyond rounding to their last digit, and 1 % of a step (tuned), as programs leave by
         # adding up steps, the times are those of a clock that jitters.
@@ -625,7 +615,7 @@ def _even_steps(table: _Table, factor: float, stated_step: float | None = None) 
     # A rounded time lies within half of the last digit from its place, and so do both ends of the
     # line of even times. The factor leaves room for binary round-off.
     digit = last_digit * (1 + 1e-6)
-    are_rounded = step > 0 and unevenness <= digit
+    are_rounded = unevenness <= digit
     if are_rounded and stated_step and abs(stated_step * n_steps - duration) <= digit:
         remark = f"its times are rounded to {last_digit:g} s: the stated step is taken"
         return _EvenSteps(stated_step, first, remark, is_stated=True)
@@ -635,8 +625,6 @@ def _even_steps(table: _Table, factor: float, stated_step: float | None = None) 
     cure = "times must rise evenly: mend, sort or resample the rows"
     if are_rounded:
         cure = "digits of the times were lost: write them in full, or say records.step"
-    elif duration == 0:
-        cure = "times are all equal: write them, or say records.step"
     value = f"time {time[wrong]:g} s after {time[wrong - 1]:g} s"
     raise file.refusal(lines[wrong], value, "even steps", cure)
 
@@ -696,7 +684,8 @@ def read_force_history(path: Path) -> ForceHistory:
         is_headed = time.is_time and seconds_of(time.unit) > 0 and is_force
         is_headed = is_headed and (not force.unit or force.unit in NEWTONS)
     if not is_headed:
-        _require_cell_of_each_head(table)
+        if table.heads:
+            table.numbers(list(table.rows)[:1])  # names a row of another count of cells
         allowed = "time [s],force [kN], or time [s],force of a course without a unit"
         cure = f"units of forces are {', '.join(NEWTONS)}; masses are no forces"
         value = " ".join(file.lines[k] for k in table.texts)[:80] or "without a head"

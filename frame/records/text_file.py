@@ -103,7 +103,7 @@ class TextFile:
         # line and the word that is wrong.
         values: list[float] = []
         for row in range(first, min(last, len(self.lines))):
-            words = _words(self.lines[row], width)
+            words = words_of(self.lines[row], width)
             if 0 < count <= len(values) and not all(NUMBER.fullmatch(word) for word in words):
                 break
             for word in words:
@@ -137,7 +137,7 @@ class TextFile:
         block = range(first, min(first + n_lines, len(self.lines)))
         are_reals = first in block and "." in self.lines[first]
         for row in block:
-            words = filter(None, _words(self.lines[row], width))
+            words = filter(None, words_of(self.lines[row], width))
             are_numbers = all(NUMBER.fullmatch(word) for word in words)
             if not are_numbers or ("." in self.lines[row] and not are_reals):
                 cure = "a line of the head is missing or damaged, or one is too many: load it anew"
@@ -179,7 +179,7 @@ class TextFile:
                 break
         # Further lines of numbers are samples that the head does not count.
         for row in range(last, len(self.lines)):
-            words = [word for word in _words(self.lines[row], width) if word]
+            words = [word for word in words_of(self.lines[row], width) if word]
             if numbers_may_follow or not words or not all(map(NUMBER.fullmatch, words)):
                 break
             last = row + 1
@@ -195,7 +195,7 @@ class TextFile:
             raise self.refusal(line, what, "as many samples as the head states", cure)
 
 
-def _words(line: str, width: int) -> list[str]:
+def words_of(line: str, width: int) -> list[str]:
     """Return the words of a line: those in columns of `width` characters, or between blanks if 0.
 
     Words of columns that are empty are empty.

@@ -250,15 +250,16 @@ def _read_by_ending(path: Path, name: str, *, max_rows: int) -> NamedMatrix:
         if re.match(rb"\s*[-\d*]", content):
             return read_abaqus(path.name, content, max_rows=max_named_rows)
         return NamedMatrix(matrix_market(path.name, content, max_rows=max_rows))
-    if ending in (".op4", ".pch", ".bdf", ".nas", ".full"):
+    if ending == ".full":
+        require_text(path)
+        return read_full(path, member=name, max_rows=MAX_ROWS)
+    if ending in (".op4", ".pch", ".bdf", ".nas"):
         require_text(path)
         content = path.read_bytes()
-        if b"\0" not in content:  # .full is binary, and .op4 may be
+        if b"\0" not in content:  # .op4 may be binary
             require_last_line(path.name, content)
         if ending == ".op4":
             return NamedMatrix(read_op4(path, content, member=name, max_rows=max_rows))
-        if ending == ".full":
-            return read_full(path, content, member=name, max_rows=MAX_ROWS)
         return read_dmig(path.name, content, member=name, max_rows=MAX_ROWS)
     if ending == ".csv":
         require_text(path)
