@@ -23,9 +23,8 @@ def free_memory() -> float:
         free.append(float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")))
     with suppress(OSError, ValueError, IndexError):
         # the kibibytes that processes can take without swapping
-        for line in Path("/proc/meminfo").read_text().splitlines():
-            if line.startswith("MemAvailable:"):
-                free.append(1024.0 * int(line.split()[1]))
+        _, _, behind = Path("/proc/meminfo").read_text().partition("MemAvailable:")
+        free.append(1024.0 * int(behind.split(maxsplit=1)[0]))
     # A container has the machine's /proc/meminfo, but its own control group, whose limit ends the
     # process without a message. The word "max" is no number: there is no limit.
     with suppress(OSError, ValueError):

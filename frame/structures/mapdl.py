@@ -54,7 +54,7 @@ def read_full(path: Path, *, member: str, max_rows: int) -> NamedMatrix:
     names: tuple[str, ...] = ()
     if read["is_named"]:
         labels = (*DIRECTIONS, *map(str, range(7, 100)))
-        unknowns: list[tuple[int, int]] = read["unknowns"].tolist()
+        unknowns = np.asarray(read["unknowns"], int)
         names = tuple(f"{node}.{labels[number - 1]}" for node, number in unknowns)
     return NamedMatrix(array, names)
 

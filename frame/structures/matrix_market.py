@@ -32,8 +32,7 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
             matrix that it calls symmetric is not square, or has entries on both sides of the
             diagonal; or there are no rows, or more rows or columns than allowed.
     """
-    # SciPy's reader is compiled code that a damaged file can end the process in, so the text is
-    # parsed here; every number goes through `float`.
+    # SciPy's reader takes 1.5 for the index 1 and the value .5, and 5.0x for 5: so it is read here.
     lines = [line for line in content.splitlines() if line.strip()]
     head = rb"(?i)%%MatrixMarket\s+matrix\s+(coordinate|array)\s+(?:real|double|integer)\s+"
     match = re.fullmatch(head + rb"(general|symmetric)\s*", lines[0]) if lines else None
@@ -43,10 +42,8 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
         raise RefusedError(name, first, allowed, "mend or write the first line")
     is_sparse = match[1].lower() == b"coordinate"
     is_symmetric = match[2].lower() == b"symmetric"
-    body = [line for line in lines[1:] if not line.lstrip().startswith(b"%")]
-    _require_numbers_alone(name, body)
-
-    sizes = numbers_in(name, body[0]) if body else np.empty(0)
+    sizes_line, *body = [x for x in lines[1:] if not x.lstrip().startswith(b"%")] or [b""]
+    sizes = numbers_in(name, sizes_line)
     n_sizes = 3 if is_sparse else 2
     cure = "the line of sizes has rows, columns, and the entries of a sparse matrix, as 18 18 42"
     are_sizes = len(sizes) == n_sizes and bool(((sizes >= 0) & (sizes == np.floor(sizes))).all())
@@ -59,7 +56,7 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     is_square = shape[0] == shape[1] or not is_symmetric
     require(is_square, name, value, "a square matrix", "mend the line of sizes, as 18 18 42")
 
-    entries = numbers_in(name, b" ".join(body[1:]))
+    entries = numbers_in(name, b"\n".join(body))
     if not is_sparse:
         return _by_columns(name, entries, shape, is_symmetric=is_symmetric)
     value = f"of {len(entries) / 3:g} entries, where its line of sizes states {sizes[2]:.0f}"
@@ -95,18 +92,6 @@ def require_last_line(name: str, content: bytes) -> None:
     allowed = "a last line that ends with a line feed"
     value = f"cut off at {content[-60:].splitlines()[-1].decode('latin-1')!r}" if content else ""
     require(is_whole, name, value, allowed, cure)
-
-
-def _require_numbers_alone(name: str, lines: list[bytes]) -> None:
-    """Check that lines have no characters but those of numbers, signs, points, e, E and blanks.
-
-    Raises:
-        RefusedError: A line has another character, as a comma or FORTRAN's D.
-    """
-    for line in lines:
-        if re.search(rb"[^-+.0-9eE\s]", line):
-            value = f"with {line[:40].decode('latin-1')!r}"
-            raise RefusedError(name, value, "numbers such as 1.25 or 1e-3", "mend this line")
 
 
 def require_size(name: str, shape: tuple[int, ...], max_rows: int) -> None:
@@ -154,12 +139,16 @@ def numbers_in(name: str, text: bytes) -> Array:
     A number beyond the range of floats gives infinity.
 
     Raises:
-        RefusedError: A word is no number, such as 1e or 1-2.
+        RefusedError: A word is no number in plain digits with points and e, such as 1e, 5D3 or nan.
     """
+    cure = "mend this word"
+    if wrong := re.search(rb"[^-+.0-9eE\s]", text):
+        around = text[max(wrong.start() - 20, 0) : wrong.end() + 20].decode("latin-1")
+        raise RefusedError(name, f"with {around!r}", "numbers such as 1.25 or 1e-3", cure)
     try:
         return np.array(text.split(), float)
     except ValueError as error:
-        raise RefusedError(name, f"with {error}", "numbers such as 1.25 or 1e-3") from None
+        raise RefusedError(name, f"with {error}", "numbers such as 1.25 or 1e-3", cure) from None
 
 
 def _by_columns(name: str, entries: Array, shape: tuple[int, int], *, is_symmetric: bool) -> Array:

@@ -29,7 +29,6 @@ from alphacut.frame.structures.entry_lists import (
 )
 from alphacut.frame.structures.mapdl import read_full
 from alphacut.frame.structures.matrix_market import (
-    dense_of_entries,
     matrix_market,
     require_last_line,
     require_size,
@@ -129,7 +128,7 @@ def _stated_factor(path: Path) -> float:
     factors = {"k": 1e3, "M": 1e6, "G": 1e9, "N": 1.0, "t": 1e3}
     cure = "write the matrix in N, m, kg, or say override = ['unit'] if the comment is wrong"
     content = path.read_bytes()
-    for comment in re.finditer(rb"(?m)^[ \t]*(?:[%#$]|\*\*|//).*$", content):
+    for comment in re.finditer(rb"(?m)^[ \t]*(?:%(?!%MatrixM)|[#$]|\*\*|//).*$", content):
         line = comment[0].decode("latin-1")
         row = content.count(b"\n", 0, comment.start()) + 1
         place = f"{path.name}, line {row}"
@@ -342,8 +341,7 @@ def _read_sparse(path: Path, *, max_rows: int) -> Array:
 
     The file has the arrays "format" (one text: "coo", "csr" or "csc"), "shape" and "data", and two
     arrays of indices: "row" and "col", or "indptr" and "indices". Entries of one place are added.
-    SciPy itself is not asked: its compiled code writes where wrong indices lead, and its own check
-    of damaged arrays misses some.
+    SciPy's compiled code writes where wrong indices lead, so that they are checked before.
 
     Args:
         path: The file.
@@ -364,31 +362,17 @@ def _read_sparse(path: Path, *, max_rows: int) -> Array:
     cure = "save it as scipy.sparse.save_npz(NAME, matrix.tocsr())"
     require(form in keys, name, f"sparse of form {form}", "csr, csc or coo", cure)
     values = np.asarray(read_npz(path, "data", kinds="iuf"), float)
-    first, second = (np.asarray(read_npz(path, key, kinds="iu"), float) for key in keys[form])
-    # In csr the pointers are over rows and in csc over columns; the other array has the other
-    # index.
-    if form != "coo":
-        first = _expanded(name, first, len(values))
-    fit = first.shape == second.shape == values.shape and values.ndim == 1
-    require(fit, name, "of arrays of different lengths", ALLOWED, "save the matrix anew")
-    rows, columns = (second, first) if form == "csc" else (first, second)
-    return dense_of_entries(name, (n_rows, n_columns), rows=rows, columns=columns, values=values)
+    first, second = (read_npz(path, key, kinds="iu") for key in keys[form])
+    from scipy import sparse  # which other files need not
 
-
-def _expanded(name: str, pointers: Array, n_entries: int) -> Array:
-    """Return the compressed index of each entry of a compressed sparse matrix, shape (entries,).
-
-    Args:
-        name: Name of the file, for the message.
-        pointers: The entries from pointers[k] up to pointers[k + 1] have the index k.
-        n_entries: Number of entries.
-
-    Raises:
-        RefusedError: The pointers do not rise from 0 to the number of entries.
-    """
-    fit = pointers.ndim == 1 and len(pointers) > 0
-    counts = np.diff(pointers) if fit else np.empty(0)
-    fit = fit and pointers[0] == 0 and pointers[-1] == n_entries and bool((counts >= 0).all())
-    value = "of pointers that do not rise from 0 to the entries"
-    require(fit, name, value, ALLOWED, "save the matrix anew")
-    return np.repeat(np.arange(len(counts), dtype=float), counts.astype(int))
+    try:
+        if form == "coo":
+            matrix = sparse.coo_array((values, (first, second)), shape=(n_rows, n_columns))
+        else:
+            made = {"csr": sparse.csr_array, "csc": sparse.csc_array}[form]
+            matrix = made((values, second, first), shape=(n_rows, n_columns))
+            matrix.check_format(full_check=True)
+    except ValueError as error:
+        raise RefusedError(name, str(error)[:80], ALLOWED, "save the matrix anew") from None
+    require(matrix.nnz == values.size, name, "of unused entries", ALLOWED, "save the matrix anew")
+    return np.asarray(matrix.toarray())
