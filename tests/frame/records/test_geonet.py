@@ -54,14 +54,6 @@ def test_each_component_is_read_by_number_and_orientation(tmp_path):
         read_record(path)
 
 
-def test_components_of_one_orientation_are_numbered(tmp_path):
-    path = saved(tmp_path, component("S90E", WAVES[0]), component("S90E", WAVES[1]))
-    record = read_record(path, channel="S90E#2")
-    assert record.samples == pytest.approx(1e-3 * WAVES[1], abs=6e-5)
-    with refuses("20161113.V2A, line 1"):
-        read_record(path, channel="S90E")
-
-
 @pytest.mark.parametrize(
     ("change", "key"),
     [
@@ -81,15 +73,6 @@ def test_a_damaged_file_is_one_line(tmp_path, change, key):
     assert damaged != text
     with refuses(key):
         read_record(saved(tmp_path, damaged))
-
-
-def test_another_time_of_the_peak_than_the_head_states_is_remarked(tmp_path):
-    text = component("S90E", WAVES[0])
-    time = f"{STEP * np.abs(WAVES[0]).argmax():8.3f}"
-    path = saved(tmp_path, text)
-    assert not read_record(path).remarks
-    path = saved(tmp_path, text.replace(time, f"{0.85:8.3f}"))
-    assert "its head states" in " ".join(read_record(path).remarks)
 
 
 def test_another_peak_than_the_head_states_is_no_record_without_a_word(tmp_path):

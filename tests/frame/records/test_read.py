@@ -90,12 +90,6 @@ def test_channels_are_told_apart(tmp_path, text, channels, words):
         read_record(path, channel="7")
 
 
-def test_a_head_of_peer_without_a_unit_is_read_in_the_stated_one(tmp_path):
-    path = saved(tmp_path, written.at2(NAMED, "ACCELERATION TIME SERIES"))
-    record = read_record(path, unit="g")
-    assert record.samples == pytest.approx(written.G * written.samples(), abs=1e-6)
-
-
 def test_columns_without_a_head_need_a_unit_and_one_column_a_step(tmp_path):
     two = saved(tmp_path, written.csv_text(mark=" ").partition("\n")[2], "record.csv")
     with refuses("record.csv, line 1"):
@@ -159,18 +153,6 @@ def test_files_that_an_editor_or_a_spreadsheet_saved_are_read(tmp_path, name, ch
     assert record.samples == pytest.approx(expected, abs=written.G * rounding)
 
 
-def test_lines_are_counted_from_the_first_empty_one(tmp_path):
-    path = saved(tmp_path, "\n\n" + written.smc(count=401))
-    with refuses("record.AT2, line 14"):
-        read_record(path)
-
-
-def test_a_file_of_spectra_is_told_so(tmp_path):
-    text = "Response and Fourier Amplitude Spectra\n" + "1.0 2.0 3.0\n" * 500
-    with refuses("record.AT2"):
-        read_record(saved(tmp_path, text))
-
-
 @pytest.mark.parametrize("factor", [0.25, 6.0])
 def test_a_peak_at_another_time_than_in_the_head_is_remarked(tmp_path, factor):
     time = 0.18 * factor
@@ -194,16 +176,6 @@ def test_the_peak_of_the_uncorrected_record_does_not_hide_that_of_the_corrected_
     another = alone.replace(f"{written.PEAK:.3f}", f"{1.3 * written.PEAK:.3f}")
     (doubt,) = read_record(saved(tmp_path, another)).remarks
     assert "its head states" in doubt
-
-
-def test_waveforms_are_read_by_obspy_or_refused_with_its_name(tmp_path):
-    head = bytearray(632)
-    head[304:308], head[316:320] = (6).to_bytes(4, "little"), (400).to_bytes(4, "little")
-    for content in (b"000001D " + bytes(504), bytes(head) + bytes(1600)):
-        path = tmp_path / "record.bin"
-        path.write_bytes(content)
-        with pytest.raises(RefusedError, match=r"miniSEED or SAC|without a unit"):
-            read_record(path)
 
 
 @pytest.mark.parametrize(("start", "expected"), [(b"000001D ", "MSEED"), (b"", "SAC")])
@@ -262,25 +234,19 @@ def test_cosmos_with_numbers_that_touch(tmp_path):
         (written.at2(NAMED, "VELOCITY TIME SERIES IN UNITS OF CM/S"), "record.AT2, line 3"),
         (written.at2(NAMED, "ACCELERATION TIME SERIES"), "record.AT2, line 4"),
         (written.at2("NPTS=  400"), "record.AT2, line 4"),
-        (written.at2("NPTS=  400, DT= 20 SEC"), "record.AT2, line 4"),
         (written.at2("NPTS=  400, DT= 0,0050 SEC"), "record.AT2, line 4"),
-        (written.at2("NPTS=  400, DT= -.0050 SEC"), "record.AT2, line 4"),
         (written.at2("NPTS=  400, DT= 5 MSEC"), "record.AT2, line 4"),
-        (written.at2("NPTS=  400.5, DT= .0050 SEC"), "record.AT2, line 4"),
         (written.at2("NPTS=  0, DT= .0050 SEC"), "record.AT2, line 4"),
         (written.at2("  400   .5D-6   NPTS, DT"), "record.AT2, line 4"),
-        (written.at2("NPTS=  400, DT= 0.0 SEC"), "record.AT2, line 4"),
         (written.at2(NAMED).replace("E-01", "E-O1", 1), "record.AT2, line 5"),
         (written.knet().replace("Scale Factor", "Scale Fact."), "record.AT2, line 17"),
         (written.knet().replace("Time(s)  2", "Time(s)  3"), "record.AT2, line 12"),
-        (written.knet().replace("200Hz", "2.0.0Hz"), "record.AT2, line 11"),
         (written.esm().replace("DATA_TYPE: ACC", "DATA_TYPE: VEL "), "record.AT2, line 11"),
         (written.esm().replace("cm/s^2", "cm"), "record.AT2, line 8"),
         (
             written.csmip(names=("1: 90",)).replace("400 points of acc", "401 points of acc"),
             "record.AT2, line 28",
         ),
-        (written.csmip(names=("1: 90",), unit="furlongs"), "record.AT2, line 28"),
         (written.smc("4 DISPLACEMENT"), "record.AT2, line 1"),
         (written.smc(count=401), "record.AT2, line 12"),
         (written.cosmos(step=0.02, names=("1: 90 deg",)), "record.AT2, line 14"),
@@ -293,30 +259,15 @@ def test_cosmos_with_numbers_that_touch(tmp_path):
             "record.AT2, line 28",
         ),
         (
-            written.csmip(names=("1: 90",)).replace("text", "410 points of corrected accel", 1),
-            "record.AT2, line 28",
-        ),
-        (
             written.esm().replace(": 1.995", ": 3.99"),
             "record.AT2, line 5",
         ),
         (written.smc().replace("*\n", "", 1), "record.AT2, line 17"),
-        (written.smc().replace("*\n", "*\n*\n", 1), "record.AT2, line 12"),
         (
             written.csmip(False, ("1: 90",), "g", raw=True).replace("text\n", "", 1),
             "record.AT2, line 20",
         ),
         (written.smc().replace("|\n", ""), "record.AT2, line 13"),
-        (written.smc().replace("| a", "| b\n| a"), "record.AT2, line 13"),
-        (written.smc(count=392), "record.AT2, line 12"),
-        (
-            written.cosmos(names=("1: 90 deg",)).replace("400 acc", "390 acc"),
-            "record.AT2, line 34",
-        ),
-        (
-            written.csmip(names=("1: 90",)).replace("400 points of acc", "320 points of acc"),
-            "record.AT2, line 28",
-        ),
         (written.smc("5 RESPONSE SPECTRA"), "record.AT2, line 1"),
     ],
     ids=lambda text: text[:12] if "\n" not in text else "file",
@@ -336,14 +287,10 @@ RECORD = "time [s],acceleration [g]\n0,0\n0.01,0.1\n0.02,-0.2\n"
     [
         ("[g]", "[kg]", 1),
         ("acc", "up [g],acc", 2),
-        ("0.01,0.1", "0.01,1_0", 3),
         ("0.01,0.1", "0.01,٣", 3),
-        ("0.01,0.1", "0.01", 3),
         ("0.01,0.1", "0.01,nan", 3),
         ("0.01,0.1", "0.013,0.1", 3),
-        ("0,0\n", "1,0\n", 3),
         ("0.02,-0.2\n", "0.02,0\n0.03,0\n0.09,0\n0.1,0\n", 6),
-        ("0.02,-0.2\n", "0.02,0\n0.03,0\n0.01,0\n0.05,1\n", 6),
     ],
 )
 def test_a_wrong_row_of_a_csv_file_is_named(tmp_path, old, new, line):
@@ -358,12 +305,9 @@ def test_a_wrong_row_of_a_csv_file_is_named(tmp_path, old, new, line):
     [
         (b"", "record.csv"),
         (b"\xff\xfet\0", "record.csv"),
-        (b"t\0i\0m\0e\0,\0", "record.csv"),
         (b"time [s],acceleration [g]\n", "record.csv"),
-        (b"a\0b", "record.csv"),
         (b"<!DOCTYPE html>\n<html>\n", "record.csv"),
         (b"PK\3\4\0[Content_Types].xml", "record.csv"),
-        (b"PK\3\4\0a.AT2", "record.csv"),
     ],
 )
 def test_a_file_that_is_no_record_is_refused(tmp_path, content, key):
@@ -377,13 +321,11 @@ def test_a_file_that_is_no_record_is_refused(tmp_path, content, key):
     ("head", "quantity"),
     [
         ("time [s],displacement [m]\n", "a displacement"),
-        ("time [s],x [mm]\n", "a displacement"),
         ("Time, Relative displ.\n", "a displacement"),
         ("# time [s] velocity [m/s]\n", "a velocity"),
         ("Time  Velocity\ns m\n", "a velocity"),
         ("t [s],force [kN]\n", "a force"),
         ("t [s],acc [N]\n", "a force"),
-        ("t [s],acc (cm/s)\n", "a velocity"),
         ("t [s],acc [counts]\n", "counts"),
         ("t [s],acc [mV]\n", "a voltage"),
         ("t [s],acc [kPa]\n", "a pressure"),
@@ -399,24 +341,11 @@ def test_a_column_of_another_quantity_is_no_acceleration(tmp_path, head, quantit
         read_record(path, unit=unit)
 
 
-def test_a_column_alone_of_another_quantity_is_no_acceleration(tmp_path):
-    path = saved(tmp_path, "velocity [cm/s]\n" + written.lines(written.samples(), "15.7E", 1))
-    with refuses("record.AT2, line 1"):
-        read_record(path, step=0.005, unit="g")
-
-
 @pytest.mark.parametrize(("unit", "factor"), [("mg", 1e-3), ("%g", 1e-2)])
 def test_small_fractions_of_gravity_are_units(tmp_path, unit, factor):
     path = saved(tmp_path, written.csv_text().replace("[g]", f"[{unit}]"))
     expected = factor * written.G * written.samples()
     assert read_record(path).samples == pytest.approx(expected, abs=1e-7)
-
-
-def test_a_unit_that_is_not_known_is_not_asked_for_again(tmp_path):
-    path = saved(tmp_path, written.csv_text().replace("[g]", "[furlong]"))
-    for unit in ("", "g"):
-        with refuses("record.AT2, line 1"):
-            read_record(path, unit=unit)
 
 
 @pytest.mark.parametrize("name", [*written.WITH_PEAK])

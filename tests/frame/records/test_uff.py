@@ -94,12 +94,6 @@ def test_data_sets_of_one_response_are_told_apart(tmp_path):
         assert samples == pytest.approx(factor * WAVE, abs=2e-5)
 
 
-def test_a_universal_file_without_time_histories_is_told_so(tmp_path):
-    geometry = "    -1\n    15\n" + f"{7:10d}{0:10d}{0:10d}{8:10d}\n" + "    -1\n"
-    with refuses("record.uff"):
-        read_record(saved(tmp_path, geometry))
-
-
 def test_exponents_without_their_letter_are_read_as_fortran_does(tmp_path):
     content = uff58(WAVE)
     bare = re.sub(rb"(\d\.\d+)[eE]([-+])(\d\d)(?!\d)", rb"\1\g<2>0\3", content)

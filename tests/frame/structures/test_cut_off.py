@@ -75,10 +75,3 @@ def test_names_of_unknowns_without_the_last_line_feed_are_refused(tmp_path):
         read_matrix(path)
     beside.write_text("".join(f"{name}\n" for name in NAMES))
     assert read_matrix(path).shape == (3, 3)
-
-
-def test_a_last_number_that_lost_its_exponent_is_not_read(tmp_path):
-    path = tmp_path / "STIF1.mtx"
-    path.write_text("1,1, 1,1,  3.0e+06\n1,1, 1,2,  -1.0e+06\n1,2, 1,2,  6.0e+0")
-    with pytest.raises(RefusedError, match=r"cut off at '1,2, 1,2, 6\.0e\+0'"):
-        read_matrix(path)

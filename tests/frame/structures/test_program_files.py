@@ -61,9 +61,7 @@ def test_dmig_cards_name_unknowns_by_grid_and_component(punch):
     [
         ("DMIG*   KAAX                          11               5", "DMIX*   KAAX    ", "damaged"),
         ("*                     11               5", "j                     11     5", "damaged"),
-        ("DMIG,MAAX,7", "DMXG,MAAX,7", "damaged"),
         ("\nENDDATA\n", "", "cut off|damaged|entries"),
-        ("3.000000000D+00\n", "3.000000000D+00 ", "damaged"),
         ("3.000000000D+00", "3.000000000X+00", "could not convert"),
         ("3.000000000D+00", "3_0.00000000D+0", "damaged"),
         ("0       6", "0       2", "of form 2"),

@@ -97,67 +97,89 @@ def test_every_format_gives_the_same_voxels(tmp_path, kind, rng):
 
 def test_endings_in_capitals_are_those_in_small_letters(tmp_path, rng):
     values = rng.integers(0, 250, SHAPE).astype("u1")
-    with (tmp_path / "ARRAY.NPY").open("wb") as file:
-        np.save(file, values)
-    stack(tmp_path / "STACK.TIF", values)
     meta_image(tmp_path / "HEAD.MHD", values)
-    nrrd(tmp_path / "BESIDE.NHDR", values, attached=False)
-    nrrd(tmp_path / "WHOLE.NRRD", values, attached=True)
     slices(tmp_path / "slices", values)
     for file in [*(tmp_path / "slices").iterdir()]:
         file.rename(file.with_suffix(".PNG"))
-    for path in tmp_path.iterdir():
-        if path.suffix != ".raw":
-            assert np.array_equal(voxels_of(path), values), path.name
-    head, data = files_of(tmp_path / "HEAD.MHD")
-    assert (head.name, data.name) == ("HEAD.MHD", "HEAD.raw")
+    for name in ("HEAD.MHD", "slices"):
+        assert np.array_equal(voxels_of(tmp_path / name), values), name
+    assert [file.name for file in files_of(tmp_path / "HEAD.MHD")] == ["HEAD.MHD", "HEAD.raw"]
+
+
+STACKS = {
+    "in colours": ((4, 5, 6, 3), {"photometric": "rgb"}),
+    "axes CYX": ((3, 5, 6), {"imagej": True}),
+    "axes ZCYX": ((2, 4, 5, 6), {"imagej": True}),
+    "axes YX": ((5, 6), {}),
+}
+
+
+@pytest.mark.parametrize("message", STACKS)
+def test_pages_that_are_no_volume_are_told(tmp_path, message):
+    shape, options = STACKS[message]
+    stack(tmp_path / "a.tif", np.arange(np.prod(shape), dtype="u2").reshape(shape), **options)
+    with pytest.raises(RefusedError, match=message):
+        voxels_of(tmp_path / "a.tif")
 
 
 @pytest.mark.parametrize(
-    ("name", "write", "message"),
+    ("name", "content"),
     [
-        ("colour.tif", lambda p: stack(p, np.arange(360, dtype="u2").reshape(4, 5, 6, 3), photometric="rgb"), "in colours"),
-        ("channels.tif", lambda p: stack(p, np.zeros((3, 5, 6), np.uint8), imagej=True), "axes CYX"),
-        ("times.tif", lambda p: stack(p, np.zeros((2, 4, 5, 6), np.uint8), imagej=True), "axes"),
-        ("plane.tif", lambda p: stack(p, np.zeros((5, 6), np.uint8)), "axes YX"),
-        ("mask.tif", lambda p: stack(p, np.arange(210).reshape(5, 6, 7) % 3 > 0), "white as zero"),
-        ("plane.npy", lambda p: np.save(p, np.zeros((5, 6))), "takes cell.pixel"),
-        ("complex.npy", lambda p: np.save(p, np.zeros((4, 5, 6), complex)), "complex128"),
-        ("thin.npy", lambda p: np.save(p, np.zeros((1, 5, 6))), "2 × 2 × 2 or more"),
-        ("nan.npy", lambda p: np.save(p, np.full((2, 5, 6), np.nan)), "not finite"),
-        ("raw.raw", lambda p: p.write_bytes(b"0" * 100), ".mhd head"),
-        ("v.nii", lambda p: p.write_bytes(b"0" * 100), "numpy.save"),
-        ("v.HDF5", lambda p: p.write_bytes(b"0" * 100), "numpy.save"),
-        ("v.vti", lambda p: p.write_bytes(b"0" * 100), "numpy.save"),
-        ("a.mhd", lambda p: meta_image(p, np.zeros((11, 5, 7), "u1")), "385 bytes; allowed: 420 for 7 × 5 × 12 of uint8; mend the sizes"),
-        ("b.mhd", lambda p: meta_image(p, np.zeros(SHAPE, "u1"), head="CompressedData = True\n"), "gzip or zlib"),
-        ("c.mhd", lambda p: meta_image(p, np.zeros(SHAPE, "u1"), head="ElementSpacing = 1 1 2\n"), "voxels of 1 × 1 × 2"),
-        ("d.mhd", lambda p: p.write_text(HEAD + "ElementType = MET_LONG_LONG\nElementDataFile = x\n"), "type"),
-        ("e.mhd", lambda p: p.write_text(HEAD + "ElementType = MET_UCHAR\nElementDataFile = x\n"), "data in x, which is no file; allowed: a file, from the folder"),
-        ("f.nhdr", lambda p: p.write_text(NRRD.format("uchar", "hex") + "data file: f.nhdr\n"), "raw or gzip"),
-        ("f.nrrd", lambda p: nrrd_with(p, "spacings: 1 0 1"), "greater than 0"),
-        ("f.nrrd", lambda p: nrrd_with(p, "spacings: 1 -1 1"), "greater than 0"),
-        ("f.nrrd", lambda p: nrrd_with(p, "spacings: 1 inf 1"), "finite"),
-        ("f.nrrd", lambda p: nrrd_with(p, "spacings: 1 1 1.1"), "1 × 1 × 1.1 along"),
-        ("f.nrrd", lambda p: nrrd_with(p, "spacings: 1 nan 1.1"), "1 × nan × 1.1 along"),
-        ("f.nrrd", lambda p: nrrd_with(p, "space directions: (1,1,0) (1,-1,0) (0,0,1)"), "along x, y and z"),
-        ("f.nrrd", lambda p: nrrd_with(p, "space directions: (1,0,0) (1,0,0) (0,0,1)"), "along x, y and z"),
-        ("f.nrrd", lambda p: nrrd_with(p, "space directions: (0,0,3) (0,1,0) (1,0,0)"), "1 × 1 × 3 along"),
-        ("s.mhd", lambda p: meta_image(p, np.zeros(SHAPE, "u1"), head="ElementSize = 1 1 3\n"), "1 × 1 × 3 along"),
-        ("t.mhd", lambda p: meta_image(p, np.zeros(SHAPE, "u1"), head="HeaderSize = 1\n"), "allowed: 1 + 420"),
-        ("u.mhd", lambda p: meta_image(p, np.zeros(SHAPE, "u1"), head="HeaderSize = -2\n"), "−1 of raw data"),
-        ("v.mhd", lambda p: meta_image(p, np.zeros(SHAPE, "u1"), head="ElementNumberOfChannels = 3\n"), "one"),
-        ("w.mhd", lambda p: p.write_text((HEAD + "ElementType = MET_UCHAR\nElementDataFile = LOCAL\n").replace("7 5 12", "-7 -5 12")), "sizes -7 -5 12"),
-        ("empty", lambda p: p.mkdir(), "0 pictures"),
-        ("noise.tif", lambda p: p.write_bytes(b"II*\0nonsense"), "0 series"),
+        ("plane.npy", np.zeros((5, 6))),
+        ("complex.npy", np.zeros((4, 5, 6), complex)),
+        ("thin.npy", np.zeros((1, 5, 6))),
+        ("nan.npy", np.full((2, 5, 6), np.nan)),
+        ("v.vti", b"0"),
+        ("noise.tif", b"II*\0nonsense"),
+        ("folder", None),
     ],
-)  # fmt: skip
-def test_what_is_no_volume_of_numbers_is_one_line(tmp_path, name, write, message):
+)
+def test_files_that_are_no_volume_of_numbers_are_refused(tmp_path, name, content):
     path = tmp_path / name
-    write(path)
-    with pytest.raises(RefusedError) as told:
+    if content is None:
+        path.mkdir()
+    elif isinstance(content, bytes):
+        path.write_bytes(content)
+    else:
+        np.save(path, content)
+    with refuses(name) as told:
         voxels_of(path)
-    assert message in str(told.value)
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("DimSize = 7 5 11", "420 bytes; allowed: 385 for 7 × 5 × 11 of uint8; mend the sizes"),
+        ("DimSize = -7 -5 12", "sizes -7 -5 12"),
+        ("CompressedData = True", "gzip or zlib"),
+        ("ElementSpacing = 1 1 2", "voxels of 1 × 1 × 2"),
+        ("ElementSize = 1 1 3", "1 × 1 × 3 along"),
+        ("ElementType = MET_LONG_LONG", "type"),
+        ("ElementDataFile = x", "data in x, which is no file; allowed: a file, from the folder"),
+        ("HeaderSize = 1", "allowed: 1 \\+ 420"),
+        ("HeaderSize = -2", "−1 of raw data"),
+        ("ElementNumberOfChannels = 3", "one"),
+        ("encoding: hex", "raw or gzip"),
+        ("spacings: 1 -1 1", "greater than 0"),
+        ("spacings: 1 inf 1", "finite"),
+        ("spacings: 1 nan 1.1", "1 × nan × 1.1 along"),
+        ("space directions: (1,1,0) (1,-1,0) (0,0,1)", "along x, y and z"),
+        ("space directions: (1,0,0) (1,0,0) (0,0,1)", "along x, y and z"),
+        ("space directions: (0,0,3) (0,1,0) (1,0,0)", "1 × 1 × 3 along"),
+    ],
+)
+def test_heads_that_are_not_read_tell_what_is(tmp_path, line, message):
+    path = tmp_path / "a.mhd"
+    if "=" in line:
+        meta_image(path, np.zeros(SHAPE, "u1"))
+        end = "ElementDataFile = a.raw\n"
+        path.write_text(path.read_text().replace(end, f"{line}\n{end}"))
+    else:
+        path = tmp_path / "a.nrrd"
+        nrrd_with(path, line)
+    with pytest.raises(RefusedError, match=message) as told:
+        voxels_of(path)
     assert "\n" not in str(told.value)
 
 
@@ -168,7 +190,6 @@ def test_slices_that_are_not_alike_and_bent_voxels_are_told(tmp_path):
         voxels_of(tmp_path / "slices")
     meta_image(tmp_path / "c.mhd", np.zeros(SHAPE, "u1"), head="ElementSpacing = 1 1 2\n")
     assert voxels_of(tmp_path / "c.mhd", (2, 1, 1)).shape == SHAPE
-    assert [file.name for file in files_of(tmp_path / "c.mhd")] == ["c.mhd", "c.raw"]
 
 
 @pytest.mark.parametrize(
@@ -192,22 +213,19 @@ print(1024 * int(re.search(r"VmHWM:\\s+(\\d+)", open("/proc/self/status").read()
     assert 1 / 1.3 < needed_memory((128, 128)) / int(found.stdout) < 1.3
 
 
-@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
-@pytest.mark.parametrize("name", ["a.png", "a.tif", "a.npy"])
-def test_grey_values_are_read_as_they_are(tmp_path, name, kind):
-    values = np.random.default_rng(0).integers(0, np.iinfo(kind).max, (5, 7)).astype(kind)
-    path = tmp_path / name
-    if name.endswith("npy"):
-        np.save(path, values)
-    else:
-        pytest.importorskip("PIL.Image").fromarray(values).save(path)
-    assert np.array_equal(pixels_of(path), values[::-1])
+@pytest.mark.parametrize("kind", ["u1", "u2"])
+def test_grey_values_are_read_as_they_are(tmp_path, rng, kind):
+    values = rng.integers(0, 250, (5, 7)).astype(kind)
+    np.save(tmp_path / "a.npy", values)
+    for name in ("a.png", "a.tif"):
+        Image.fromarray(values).save(tmp_path / name)
+    for path in tmp_path.iterdir():
+        assert np.array_equal(pixels_of(path), values[::-1])
 
 
 def test_a_mask_whose_white_is_zero_is_refused_with_its_fraction(tmp_path):
     """Readers of such a TIFF disagree on which of both values is bright: tifffile writes masks so."""
-    image = pytest.importorskip("PIL.Image")
-    mask = image.fromarray(np.arange(32 * 32).reshape(32, 32) < 256)
+    mask = Image.fromarray(np.arange(32 * 32).reshape(32, 32) < 256)
     for photometric in (1, 0):
         mask.save(tmp_path / "mask.tif", tiffinfo={262: photometric})
         if photometric:
@@ -219,10 +237,8 @@ def test_a_mask_whose_white_is_zero_is_refused_with_its_fraction(tmp_path):
 
 BROKEN = {
     "colour.png": np.arange(48, dtype=np.uint8).reshape(4, 4, 3),
-    "nan.npy": np.array([[1.0, np.nan], [0.0, 1.0]]),
     "line.npy": np.arange(5.0),
     "text.png": b"no image",
-    "text.npy": b"no array",
     "header.npy": b"\x93NUMPY\x01\x00\x08\x00{'descr\n",  # NumPy's reader raises a TokenError
 }
 
@@ -235,12 +251,12 @@ def test_files_that_are_no_plane_grey_image_are_refused(tmp_path, name):
     elif name.endswith("npy"):
         np.save(path, content)
     else:
-        pytest.importorskip("PIL.Image").fromarray(content).save(path)
+        Image.fromarray(content).save(path)
     with refuses(name):
         pixels_of(path)
 
 
-@pytest.mark.parametrize("word", ["True", "true", "T", "1", "t"])
+@pytest.mark.parametrize("word", ["true", "T", "1"])
 def test_every_word_for_big_endian_is_read_so(tmp_path, rng, word):
     values = rng.integers(0, 60000, SHAPE).astype("u2")
     for key in ("BinaryDataByteOrderMSB", "ElementByteOrderMSB"):
