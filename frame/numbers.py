@@ -73,9 +73,9 @@ modes and leaves less of the gap to the search."""
 MAX_ERROR_FRACTION = 0.2
 """Fraction of the gap that the error of the modal model may take on either side. A larger number
 needs a lower degree and leaves less of the gap to the search."""
-LEFT_OUT_MODES = 1 / 120
-"""Fraction of the gap that modes may contribute that are left out. Their energy counts as error; a
-larger number leaves out more modes and increases the error."""
+LEFT_OUT_MODES = 0.1
+"""Fraction of the wanted error of a modal model that modes may contribute that are left out. Their
+energy counts as error; a larger number leaves out more modes and increases the error."""
 
 FIRST_DEGREE, MAX_DEGREE = 3, 20
 """Smallest and largest degree of the modal model. A larger first degree is wasted on narrow boxes;

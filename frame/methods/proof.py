@@ -17,7 +17,6 @@ from __future__ import annotations
 import logging
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from math import comb
 from typing import ClassVar
 
 import numpy as np
@@ -29,28 +28,21 @@ from alphacut.frame import numbers
 from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds, Goal
 from alphacut.frame.bounds.branch_and_bound import Optima, bound_problems, first_optima
 from alphacut.frame.bounds.remainders import remainder_bounds
-from alphacut.frame.bounds.spatial_branch_and_bound import prove
+from alphacut.frame.bounds.spatial_branch_and_bound import halvings, prove
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, MAX_PARAMETERS, Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.methods.yielding_proof import YIELDING_GAP, prove_yielding
 from alphacut.frame.modes.damped import require_dissipation
-from alphacut.frame.modes.damped_modes import as_oscillators
+from alphacut.frame.modes.damped_modes import FittedModel, as_oscillators, fitted_model
 from alphacut.frame.modes.modal_model import ModalModel
-from alphacut.frame.modes.model_error import (
-    error_fractions,
-    proved_error,
-)
+from alphacut.frame.modes.model_error import error_fractions
 from alphacut.frame.result import Envelope
 from alphacut.frame.threshold import Threshold
 from alphacut.frame.verification.rounding import rounding_margin
 
 LOG = logging.getLogger(__name__)
-
-
-class GapError(UnprovedError):
-    """The error of the modal model is bounded, but leaves too little of the gap."""
 
 
 @dataclass(frozen=True)
@@ -171,9 +163,9 @@ class Proof:
             time nodes, with the inputs that attain them.
 
         Raises:
-            UnprovedError: The modal model is not accurate enough even for the largest gap: a
-                `GapError` with the input to bisect, or a `BisectionError` if bisections would not
-                help. Or the structure has no smooth oscillating modes over the sub-box.
+            UnprovedError: The modal model is not accurate enough even for the largest gap, with
+                the input to bisect, or as a `BisectionError` if bisections would not help. Or the
+                structure has no smooth oscillating modes over the sub-box.
         """
         # Models by their degree, with their errors. Those for a gap leave out no mode that a larger
         # gap would keep, and serve there as well.
@@ -181,102 +173,35 @@ class Proof:
 
         def bounds_within(gap: float) -> list[BoxBounds]:
             """Return the bounds for one gap; raise UnprovedError if the model is inaccurate."""
-            model, error = self._accurate_model(flow, boxes, goal.scale, gap, models)
-            return bound_levels(model, error, goal.scale, gap, self.boxes, goal.workers, goal.tick)
+            tolerance = numbers.MAX_ERROR_FRACTION * gap * goal.scale
+            found = fitted_model(flow, boxes, tolerance, models)
+            if found.excess > 1:
+                raise self._inaccurate(found)
+            return bound_levels(
+                found.model, found.error, goal.scale, gap, self.boxes, goal.workers, goal.tick
+            )
 
         for gap in self._gaps[:-1]:
-            with suppress(GapError, BisectionError):
+            with suppress(UnprovedError):
                 return bounds_within(gap)
         return bounds_within(self._gaps[-1])
 
-    def _accurate_model(
-        self,
-        flow: LinearFlow,
-        boxes: Boxes,
-        scale: Array,
-        gap: float,
-        models: dict[int, tuple[ModalModel, Array]],
-    ) -> tuple[ModalModel, Array]:
-        """Return a modal model of a box that is accurate enough for a gap.
-
-        Args:
-            flow: The exact response.
-            boxes: The box on each level.
-            scale: Unit of the gap for each output, shape (outputs,).
-            gap: The gap.
-            models: Models of the box for this gap or smaller ones by their degree, with their
-                errors; further ones are added.
-
-        Returns:
-            The model, and the guaranteed bound of its error at the time nodes, shape (times,
-            outputs), which is at most a fifth of the gap.
-
-        Raises:
-            GapError: No degree is accurate enough, and bisections would help.
-            BisectionError: Too many bisections would be needed.
-            UnprovedError: The structure has no smooth oscillating modes over the box.
-        """
-        max_degree = _max_degree(len(boxes.names))
-        # Most structures need few degrees, and the cost of a degree grows as the number of
-        # monomials.
-        degree = min(numbers.FIRST_DEGREE, max_degree)
-        last_step = 0
-        last_excess = np.inf
-        while True:
-            # Modes that contribute less than a small part of the gap are left out; their energy
-            # counts as error.
-            if degree not in models:
-                left_out = numbers.LEFT_OUT_MODES * gap * scale
-                model = ModalModel.of_degree(flow, boxes, degree, left_out)
-                models[degree] = model, proved_error(model)
-            model, error = models[degree]
-            excess = float((error / scale).max()) / (numbers.MAX_ERROR_FRACTION * gap)
-            if excess <= 1:
-                return model, error
-            # The factor of the error for each further degree, and the number of degrees that are
-            # needed at this rate. Before a factor is known, 0.1 is taken: a larger one would go up
-            # in larger steps (tuned).
-            decay = 0.1
-            if last_step:
-                decay = (excess / last_excess) ** (1 / last_step)
-            further = np.inf
-            if decay < 1:
-                further = np.log(excess) / -np.log(decay)
-            is_hopeless = last_step > 0 and not degree + further < max_degree + 1
-            if degree == max_degree or is_hopeless:
-                raise self._gap_error(model, excess, decay)
-            # Four fifths of the degrees that the errors ask for are taken at once (tuned: more
-            # often end at a degree that is higher than necessary).
-            last_step = min(max(1, int(0.8 * further)), max_degree - degree)
-            last_excess = excess
-            degree += last_step
-
-    def _gap_error(self, model: ModalModel, excess: float, decay: float) -> UnprovedError:
+    def _inaccurate(self, found: FittedModel) -> UnprovedError:
         """Return, without raising it, the error for a model that is too inaccurate.
 
-        It is a `GapError` with the index of the input to bisect, the one that contributes most, or
-        a `BisectionError` if more bisections are needed than the number of sub-boxes allows, or if
-        no input contributes to the error.
-
-        Args:
-            model: The model of the last degree that was tried.
-            excess: Its error over the allowed one, above 1.
-            decay: Factor of the error for each further degree, positive.
+        It has the index of the input to bisect, the one that contributes most; or it is a
+        `BisectionError` if more bisections are needed than the number of sub-boxes allows, or if no
+        input contributes to the error.
         """
-        what = f"the proved error of the modes, {numbers.MAX_ERROR_FRACTION * excess:.3g} of it,"
-        what += " takes too much of the gap"
+        what = f"the proved error of the modes, {numbers.MAX_ERROR_FRACTION * found.excess:.3g} of"
+        what += " it, takes too much of the gap"
         cure = "narrower or fewer fuzzy inputs, or a wider gap, can be proved"
-        fractions = error_fractions(model)
-        max_degree = _max_degree(len(model.boxes.names))
-        # The error is extrapolated to the largest degree. There halving the inputs that contribute
-        # divides the error of the degree N by 2^(N + 1), its first term that is left out. The
-        # halvings are distributed among the inputs in proportion to their fractions of the error.
-        log2_excess = np.log2(excess) + (max_degree - model.degree) * np.log2(decay)
-        halvings = max(1.0, np.ceil(log2_excess / (max_degree + 1)))
-        are_affordable = halvings <= np.log2(self.parts) * (fractions**2).sum()
-        if not are_affordable:
+        fractions = error_fractions(found.model)
+        # The halvings are distributed among the inputs in proportion to their fractions.
+        is_affordable = found.halvings <= halvings(fractions, self.parts)
+        if not (is_affordable and fractions.any()):
             return BisectionError(what, cure)
-        return GapError(what, cure, int(fractions.argmax()))
+        return UnprovedError(what, cure, int(fractions.argmax()))
 
 
 def bound_levels(
@@ -373,15 +298,3 @@ def bound_levels(
         )
         bounds.append(box_bounds)
     return bounds
-
-
-def _max_degree(n_inputs: int) -> int:
-    """Return the largest degree of a modal model whose polynomials have so many inputs."""
-    # Tuned: with more than 3100 monomials, the degrees 13, 10 and 8 for 4, 5 and 6 inputs, a model
-    # takes more time than bisections of the box do. A polynomial of degree N in n inputs has
-    # (n + N)! / (n! N!) monomials.
-    max_terms = 3100
-    degree = numbers.MAX_DEGREE
-    while comb(n_inputs + degree, n_inputs) > max_terms:
-        degree -= 1
-    return degree

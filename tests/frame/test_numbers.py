@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Accelerogram, DualProof, Proof, StoreyFrame, envelope, numbers
+from alphacut.frame.modes.damped_modes import fitted_model
 from alphacut.fuzzy import Interval
 from tests.frame.motions import exact_motions, random_points, require_inside
 
@@ -18,7 +19,7 @@ NARROW = {**INPUTS, "k1": Interval(3.8e7, 4.2e7)}
 MOTION = {"duration": 0.4, "step": 0.05, "alpha": (0,), "relative": True, "progress": False}
 DUAL = DualProof(gap=1e-3, peaks=5e-3, parts=6, workers=1)
 TUNED = [name for name in vars(numbers) if name.isupper()]
-BRANCH_AND_BOUND = inspect.getsource(inspect.getmodule(Proof))
+BRANCH_AND_BOUND = "".join(inspect.getsource(inspect.getmodule(x)) for x in (Proof, fitted_model))
 
 
 @pytest.mark.parametrize("factor", [0.5, 2])
