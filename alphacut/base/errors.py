@@ -60,7 +60,7 @@ def fit_message(
     min_shown = 20
     end = ""
     if cure:
-        end = f"; {cure}"
+        end = f"; {printable(cure, len(cure))}"
     room = max(MAX_LENGTH - len(end), min_shown)
     excess = max(len(compose(value, allowed)) - room, 0)
     value = printable(value, max(min_shown, len(value) - excess))

@@ -33,6 +33,7 @@ _SPELLED = {
     r"(?:\bg\s*=\s*)?\b(?:9\.8\d*\s*\(?m|98[01]\.?\d*\s*\(?(?:cm|gal)|386\.\d*\s*in"
     r"|32\.\d*\s*ft)\S*": "",
     r"(?<=\bacc)(\w*\.?)\s*/\s*\(": r"\1 (",
+    r"\blengths?\W+(?:units?\W+|in\W+)?([cm]?m|in|ft)\b(?=.*\btimes?\W.*\bs(?:ec)?\b)": r"\1/s^2",
 }
 # A unit of acceleration that cannot be something else; not part of a quotient such as V/(m/s^2).
 _UNIT = (
@@ -49,7 +50,7 @@ _FACTOR = (
     r"(?:[x×*·]\s*|\b)10\s*(?:\^|\*\*|⁻|[²³⁴⁵⁶])|[x×*·]\s*10\s*[-−]\s*\d|\b1\.?0*e[-+]?\d"
     r"|[x×]\s*(?:1000*\b|0?\.0)"
     r"|\b(?:scal\w*[\s_]*factor|scal\w*(?=\s*[:=])|multipl\w*|conversion)[\s:=]*(?:by\s+)?"
-    r"(?!1\.?0*\b)[\d.]"
+    r"(?!1(?:\.0*)?\b)[\d.]|\b(?:of|in|is)\s+\d*\.?\d+\s*g\b"
 )
 _INTERVAL = (
     r"(?:\b(?:sampl\w*|time|data|digiti[sz]\w*)[\s_-]*(?:interval|step|period|spacing|increment)s?"
@@ -57,9 +58,11 @@ _INTERVAL = (
 )
 _RATE = (
     r"(?:\b(?:sampl\w*|digiti[sz]\w*|acquisition|data)[\s_-]*(?:rate|freq\w*)|(?<![a-z])fs\b"
-    r"|\bsamples?/s(?:ec(?:ond)?)?|\bsps|\bsampled|\bsampling(?=[\s:=]*[\d.]+\s*k?hz))"
+    r"|\bsamples?/s(?:ec(?:ond)?)?|\bsps"
+    r"|(?:\bsampl\w*|\brate|\bdigiti[sz]\w*|@)"
+    r"(?=(?:(?!filt|pass|corner|cut|band)[^\d\n]){0,20}[\d.]+\s*k?hz))"
 )
-_BEHIND = r"[\s_]*(?:[\[(](?P<before>[^\])]*)[\])])?[\s:=@\"]*(?:(?:is|of|at)\s+)?"
+_BEHIND = r"[\s_]*(?:[\[(](?P<before>[^\])]*)[\])])?[\s:=@\"']*(?:(?:is|was|of|at|with|by)\s+)?"
 
 
 @dataclass
@@ -91,6 +94,8 @@ class TextStatements:
             text = file.lines[row]
             for pattern, symbol in _SPELLED.items():
                 text = re.sub(pattern, symbol, text, flags=re.IGNORECASE)
+            # As "1/100 sec".
+            text = re.sub(r"\b1/(\d{2,5})(?=\s*s)", lambda x: f"{1 / int(x[1]):.9g}", text)
             place = f"line {file.line_number(row)}"
             found._add_units(text, row, place)
             found.steps += _steps(text, place)
@@ -189,9 +194,8 @@ def _steps(text: str, place: str) -> Iterator[Stated]:
         unit = match["unit"] or match["unit2"]
         if seconds_of(unit):
             yield _step(number, seconds_of(unit), f"{number} {unit}", place)
-    rate = (
-        rf"{_RATE}{_BEHIND}{_NUMBER}\s*(?P<unit>kHz)?|(?P<number2>\d+\.?\d*)\s*(?:sps|samples?/s)"
-    )
+    rate = rf"{_RATE}{_BEHIND}{_NUMBER}\s*(?P<unit>kHz)?"
+    rate += r"|(?P<number2>\d+\.?\d*)\s*(?:sps|(?:samples?|points?)/s)"
     for match in re.finditer(rate, text, re.IGNORECASE):
         number = match["number"] or match["number2"]
         is_kilo = "khz" in (match["unit"] or match["before"] or "").lower()

@@ -64,12 +64,13 @@ class _Column:
         """Return name and unit of a column from its cell in the head of a table.
 
         A unit stands in brackets, "Accel. [g]" or "acc (g)", and may then be anything; or it is the
-        last word, "acc, g", "acc g" or "acc_g", and then must be a unit of acceleration, time or
-        force. Blanks and quotes around the cell are left out.
+        last word, "acc, g", "acc g", "acc_g" or "acc/g", and then must be a unit of acceleration,
+        time or force. Blanks and quotes around the cell are left out.
         """
         text = cell.strip(' "')
         if match := re.fullmatch(r"(.*?)[\s,]*[\[(]\s*([^\])]*?)\s*[\])]?", text):
             return cls(match[1].lower(), match[2])
+        text = re.sub(r"(?i)^(t|time|a|acc\w*)/", r"\1 ", text)
         match = re.fullmatch(r"(.*?)[\s,_]+(\S+?)", text)
         # Without brackets the last word is a unit only if it is known: "ground acceleration" has
         # none.
@@ -265,12 +266,13 @@ def _columns_of(lines: Sequence[str], count: int) -> tuple[list[_Column], int]:
     Returns:
         The columns, and how many of the lines name them.
     """
-    last = lines[-1] if lines else ""
+    last = lines[-1].rstrip(" ,;\t") if lines else ""
     cells = _cells_of_head(last, count)
     if not cells:
         # One that begins with times has a cell for each column, or the rows are wrong.
         cells = re.split("[,;\t]", last)
-        if len(cells) == 1 or not _Column.of(cells[0]).is_time:
+        first = _Column.of(cells[0])
+        if len(cells) == 1 or not first.is_time or re.search(r"\d", first.name):
             return [], 0
     units = [cell.strip(' "[]()') for cell in cells]
     if all(acceleration_factor(x) or seconds_of(x) or other_quantity(x) for x in units):

@@ -205,6 +205,17 @@ HEADS = [
         0.01,
     ),
     ("Sa spectrum matched record; units: g; dt: 0.01\n", COLUMN, 0.01, G),
+    ("# acceleration multiplied by 1000, m/s2\ntime [s],acc\n", (",", 1), 0.01, None),
+    ("time [s],acc\n# acc is given in units of 0.01 g\n", (",", 1), 0.01, None),
+    ("; Units: length cm, time s\n; acceleration, dt 0.01\n", COLUMN, 0.01, 0.01),
+    ("Acceleration [cm/s²] sampled with 250 Hz\n", COLUMN, 0.004, 0.01),
+    ("#unit=m/s^2;rate=100Hz\n", COLUMN, 0.01, 1),
+    ("a_x [m/s^2] @ 100 Hz\n", COLUMN, 0.01, 1),
+    ("<meta unit='mm/s^2' dt='0.01'/>\n", COLUMN, 0.01, 0.001),
+    ("acceleration in ft/sec/sec\nDigitized at 50 points/sec\n", SERIES, 0.02, 0.3048),
+    ("*** accelerations in g's, delta t = 1/100 sec ***\n", COLUMN, 0.01, G),
+    ("t/ms a/(cm/s²)\n", (" ", 1000), 0.01, 0.01),
+    ("Time [s],Acceleration [g],\n", (",", 1), 0.01, G),
 ]
 """Heads with the layout of the numbers, their step in s, and their unit in m/s²; None of others."""
 
