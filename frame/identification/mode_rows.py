@@ -14,6 +14,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.csv_columns import fields, number, text_of
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.stated import Stated, settled
+from alphacut.frame.records.stated import FACTOR
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,7 @@ HERTZ = {
     "hz": 1.0, "khz": 1e3, "hertz": 1.0, "cps": 1.0, "cycles/s": 1.0, "cycles/sec": 1.0,
     "cycle/s": 1.0, "cycles per second": 1.0, "rad/s": 0.0, "rad/sec": 0.0, "rpm": 0.0,
     "1/min": 0.0, "radians per second": 0.0, "radians/second": 0.0, "rad s-1": 0.0, "rad*hz": 0.0,
+    "cpm": 0.0, "1/s": 0.0, "s^-1": 0.0,
 }  # fmt: skip
 
 
@@ -90,18 +92,21 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
         words = (
             r"(?i)\b(?:periods?|omega\w*|angular|circular|pulsation|eigenvalues?|lambda|2\s*pi)\b"
         )
-        words += r"|ω|2\s*π|^T\b"
+        words += rf"|ω|2\s*π|^T\b|{FACTOR}|\bscaled\s+by\b|\bin\s+[\d.]+\s*k?hz"
+        if {"frequency_std", "shape_std"} & columns.keys():
+            words += r"|(?:std|deviation|scatter|error|uncertaint)\w*\b.*(?:%|\bper\s?cent)"
         other = next((x for x in [*header, *comments] if re.search(words, x.strip())), "")
-        cure = "write frequencies in Hz: ω/(2π), or 1/T"
+        cure = "write frequencies in Hz, ω/(2π) or 1/T, and deviations in Hz, without a factor"
         require(not other, place, other[:80], "frequencies, not angular ones or periods", cure)
     allowed = (
-        "mode,frequency [Hz],q1,q2 … with the floors that were measured; frequency_std [Hz] and"
-        " shape_std may stand before q1"
+        "mode,frequency [Hz],q1,q2 … with the floors that were measured, in one unit; frequency_std"
+        " [Hz] and shape_std may stand before q1"
     )
     is_known = {"mode", "frequency"} <= columns.keys() and len(columns) == len(header)
     is_known = is_known and all(
         re.fullmatch(r"mode|shape_std|q[1-9]\d*|frequency(_std)?", name) for name in columns
     )
+    is_known = is_known and len({x for name, x in units.items() if name[0] == "q"}) < 2
     require(is_known, place, shown, allowed)
     stated: list[Stated] = []
     if not override:
@@ -149,7 +154,8 @@ def _units_in_comments(path: Path, head_row: int) -> Iterator[Stated]:
     pattern = "|".join(re.escape(unit) for unit in sorted(HERTZ, key=len, reverse=True))
     for row, line in enumerate(text_of(path).splitlines(), 1):
         if line.startswith("#") and row != head_row:
-            found = re.search(rf"(?<![\w/.])(?:{pattern})(?!\w)", line, re.IGNORECASE)
+            # Behind a number it is no unit of others, as in "sampled at 200 Hz".
+            found = re.search(rf"(?<![\w/.])(?<!\d )(?:{pattern})(?!\w)", line, re.IGNORECASE)
             place = f"{path.name}, line {row}"
             is_sampling = re.search(r"(?i)sampl|filter|band|resolution|\bdf\b", line)
             if found and not is_sampling:

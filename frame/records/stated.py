@@ -46,7 +46,7 @@ _G = (
     r"|\bin\s+[(\"']?(g'?s?)\b(?!\s*/)|\b(g)\s+units?\b|\b(?:acc\w*|ordinates?|amplitudes?|values?|data)\W+(g'?s?)\W*$"
 )
 _OTHER_UNIT = r"\bunits?\b\s*(?:(?:of|are|is|in)\b)?[\s:=]*[\[(]?([^\s,;\])]+)"
-_FACTOR = (
+FACTOR = (
     r"(?:[x×*·]\s*|\b)10\s*(?:\^|\*\*|⁻|[²³⁴⁵⁶])|[x×*·]\s*10\s*[-−]\s*\d|\b1\.?0*e[-+]?\d"
     r"|[x×]\s*(?:1000*\b|0?\.0)"
     r"|\b(?:scal\w*[\s_]*factor|scal\w*(?=\s*[:=])|multipl\w*|conversion)[\s:=]*(?:by\s+)?"
@@ -127,7 +127,7 @@ class TextStatements:
         into = self.peak_units if is_peak else self.units
         for unit in units:
             into.append(Stated(acceleration_factor(unit) or 0.0, unit, place))
-        if not is_peak and (is_multiple or re.search(_FACTOR, text, re.IGNORECASE)):
+        if not is_peak and (is_multiple or re.search(FACTOR, text, re.IGNORECASE)):
             self.factors.append(row)
         of_times = r"\b(?:time|abscissa)s?\b[\s,:=(\[]*(?:in\s+)?([a-zµμ]+)"
         for found in re.finditer(of_times, text, re.IGNORECASE):
