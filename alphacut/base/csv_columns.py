@@ -15,7 +15,7 @@ from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError
 from alphacut.base.memory import require_text
 from alphacut.base.seen_folders import unseen
-from alphacut.base.stated import METRES
+from alphacut.base.stated import LENGTHS, METRES
 
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 """A number in plain ASCII digits."""
@@ -163,5 +163,5 @@ def _column(header: list[str], name: str, path: Path) -> tuple[int, float]:
     allowed = f"a column '{name} [mm]'"
     if name == "r":
         allowed += " or 'd [mm]'"
-    units = f"units are {', '.join(METRES)}"
+    units = f"units are {LENGTHS}"
     raise RefusedError(f"{path.name}, header", ",".join(header)[:80], allowed, units)

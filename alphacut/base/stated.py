@@ -19,6 +19,14 @@ METRES = {
     "in": 0.0254, "inch": 0.0254, "inches": 0.0254, "ft": 0.3048, "foot": 0.3048, "feet": 0.3048,
 }  # fmt: skip
 """Metres in a unit of length, in small letters. The micro sign and the Greek letter look alike."""
+PREFIXES = {"nano": 1e-9, "micro": 1e-6, "milli": 1e-3, "centi": 1e-2, "": 1.0}
+METRES |= {
+    f"{prefix}{word}": factor
+    for prefix, factor in PREFIXES.items()
+    for word in ("meter", "meters", "metre", "metres")
+}
+LENGTHS = "nm, um, mm, cm, m, in or ft"
+"""Units of length that messages name."""
 
 
 @dataclass(frozen=True)

@@ -164,8 +164,9 @@ def read_head(path: Path, sides: Sequence[float], override: Collection[str] = ()
     in_file_order = "units" in entries.values
     ordered = [units[axis] for axis in order] if in_file_order else units
     labels = " ".join(entries.value(key) for key in ("kinds", "labels", "space"))
-    is_time = re.search(r'\btime\b|"t"', labels) or {"s", "ms", "sec"} & {u.lower() for u in units}
-    require(not is_time, name, f"with a time as an axis, {labels}", "three axes of space")
+    others = r'\btime\b|"t"|\b(?:list|\w*vector|\w*color|complex|\w*matrix|normal)\b'
+    is_other = re.search(others, labels) or {"s", "ms", "sec"} & {u.lower() for u in units}
+    require(not is_other, name, f"with another axis, {labels}", "three axes of space")
     known = ("units", "spacings", "elementspacing", "elementsize", "elementdatafile", "data file")
     texts = [f"{key} {value}" for key, value in entries.values.items() if key not in known]
     if not any(units):
@@ -265,7 +266,9 @@ class _Entries:
         lines = start.splitlines(keepends=True)
         for row, line in enumerate(lines, 1):
             size += len(line)
-            key, *value = re.split(r":=|[=:]", line.decode("latin-1").strip(), maxsplit=1)
+            key, *value = re.split(
+                r":=|[=:]", line.decode("latin-1").replace("Âµ", "µ").strip(), maxsplit=1
+            )
             values[key.strip().lower()] = "".join(value).strip()
             is_list = values[key.strip().lower()].startswith("LIST")
             if key.strip() in ("", "ElementDataFile") or is_list:  # raw data may follow
@@ -343,7 +346,8 @@ def _layout(name: str, entries: _Entries) -> _Layout:
     ends = [_numbers(name, entries.value(key)) for key in ("axis mins", "axis maxs")]
     sizes = _numbers(name, entries.value("sizes"))
     if not spacing and all(len(numbers) == 3 for numbers in (*ends, sizes)):
-        spacing = list(np.abs(np.subtract(ends[1], ends[0])) / sizes)
+        is_of_nodes = "node" in entries.value("centerings", "centers")  # at both ends
+        spacing = list(np.abs(np.subtract(ends[1], ends[0])) / np.subtract(sizes, is_of_nodes))
     lengths = np.array(spacing or [math.nan] * 3)
     # NRRD writes vectors in brackets, which may be as long as a voxel; MetaImage has three names.
     text = entries.value("space directions", "transformmatrix", "rotation", "orientation")

@@ -7,7 +7,7 @@ import re
 from collections.abc import Collection, Iterable, Sequence
 
 from alphacut.base.errors import require
-from alphacut.base.stated import METRES, Stated, settled
+from alphacut.base.stated import LENGTHS, METRES, Stated, settled
 
 _UNITS = "|".join(sorted(METRES, key=len, reverse=True))
 
@@ -52,7 +52,7 @@ def require_spacing(
     factors = [METRES.get(unit, math.nan) for unit in units]
     if all(math.isnan(factors[k]) for k in known):
         is_one = len({units[k] for k in known}) < 2
-        require(is_one, name, f"voxels of {shown}", f"units {', '.join(METRES)}")
+        require(is_one, name, f"voxels of {shown}", f"units {LENGTHS}")
         scales = [expected[k] / stated[k] for k in known] or [1.0]
         factors = [scales[0]] * len(stated)
         shown_sides = " : ".join(f"{side:g}" for side in expected)
@@ -63,14 +63,18 @@ def require_spacing(
     require(are_alike, name, f"voxels of {shown} along x, y, z", shown_sides, cure)
     number = r"(\d+\.?\d*(?:e[-+]?\d+)?|\.\d+)"
     further = rf"(?:\s*(?:[x×,;*]|\s)\s*{number}\s*[x×,;*\s]\s*{number})?"
-    words = r"(slice|layer|section|\bz)?[\s_-]*(?:vox|pix|spac|resol|thick)[^\d\n]{0,40}"
-    pattern = rf"{words}{number}{further}\s*[\[(]?({_UNITS})\b"
+    words = r"(slice|layer|section|\bz)?s?[\s_-]*(vox|pix|spac|resol|thick|isotrop|every|step)"
+    filling = r"(?:(?!slice|layer|section|\bz\b)[^\d\n]){0,40}"
+    pattern = rf"{words}{filling}{number}{further}\s*[\[(]?({_UNITS})\b"
     for text in texts:
+        # As "2 um/pixel".
+        text = re.sub(rf"({number}\s*(?:{_UNITS}))\s*(?:/|per)\s*(vox|pix)\w*", r"\3: \1", text)
         for match in re.finditer(pattern, text, re.IGNORECASE):
-            axis_word, first, second, third, unit = match.groups()
+            axis_word, what, first, second, third, unit = match.groups()
             lengths = [first, second or first, third or first][: len(expected)]
             for axis, (length, side) in enumerate(zip(lengths, expected, strict=True)):
-                if axis_word and axis < 2:  # the distance of slices, which lie along z
+                # Slices lie along z, and a pixel lies in a slice.
+                if axis < 2 if axis_word else axis == 2 and what.lower() == "pix" and not third:
                     continue
                 own = Stated(METRES[unit.lower()] * float(length), match[0])
                 said = Stated(side, f"of {side:g} m along {'xyz'[axis]}")
@@ -79,11 +83,8 @@ def require_spacing(
 
 def unit_in_texts(texts: Iterable[str]) -> str:
     """Return the unit of all lengths that lines state, as "lengths in um"; empty if none does."""
-    spelled = {r"micro-?met\w+": "um", r"milli-?met\w+": "mm", r"nano-?met\w+": "nm"}
     for text in texts:
-        for pattern, unit in spelled.items():
-            text = re.sub(pattern, unit, text, flags=re.IGNORECASE)
-        pattern = rf"\b(?:in|units?\s*[:=]*(?:\s*(?:are|is|of))?)\s*[\[(\"]?({_UNITS})\b"
+        pattern = rf"(?:\bin|units?\s*[:=]*(?:\s*(?:are|is|of))?)\s*[\[(\"]?({_UNITS})\b"
         if match := re.search(pattern, text, re.IGNORECASE):
             return match[1]
     return ""

@@ -105,7 +105,8 @@ def _read_file(
     max_bytes = _max_bytes_per_byte(compression) * file_size
     require(n_bytes <= max_bytes, name, what, f"what {file_size} bytes can hold")
     spacing, units = _spacing(file)
-    texts = [] if file.is_ome else [file.pages.first.description]
+    texts = [str((file.imagej_metadata or {}).get("Info", ""))]
+    texts += [] if file.is_ome else [file.pages.first.description]
     require_spacing(name, spacing, sides, units, texts=texts, override=override)
 
     if compression == 5:  # LZW, which tifffile does not unpack without another package

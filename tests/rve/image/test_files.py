@@ -445,6 +445,19 @@ def test_units_of_single_axes_are_compared_and_may_be_overridden(tmp_path, rng):
         ("nrrd", "pixel_size:=2 um", (2, 2, 2)),
         ("nrrd", "spacings: 2 2 5\n# lengths in micrometers", (2, 2, 5)),
         ("mhd", "Spacing: 2 um", (2, 2, 2)),
+        ("mhd", "Comment = 2 um/pixel in plane, slices every 5 um", (2, 2, 5)),
+        ("mhd", "Comment = isotropic 5 um", (5, 5, 5)),
+        ("mhd", "Comment = 1 voxel = 5 micrometers", (5, 5, 5)),
+        ("mhd", "ElementSpacing = 2 2 5\nElementSpacingUnit = microns", (2, 2, 5)),
+        ("mhd", "ElementSpacing = .002 .002 .005\nDistanceUnits = millimeter", (2, 2, 5)),
+        ("mhd", "Comment = pixel size: 2 um, z step: 5 um", (2, 2, 5)),
+        ("nrrd", "voxelsize:=2.0 2.0 5.0 µm", (2, 2, 5)),
+        ("nrrd", "content: scan at 5 µm/voxel", (5, 5, 5)),
+        (
+            "nrrd",
+            'centerings: node node node\naxis mins: 0 0 0\naxis maxs: 12 8 55\nunits: "um" "um" "um"',
+            (2, 2, 5),
+        ),
         ("nrrd", 'spacings: 2 2 0.005\nunits: "um" "um" "mm"', (2, 2, 5)),
         (
             "nrrd",
@@ -472,6 +485,7 @@ def test_sides_that_heads_state_with_units_are_those_of_the_case(tmp_path, form,
         'units: "um" "um" "s"\nspacings: 1 1 1',
         "space: scanner-xyz-time",
         'labels: "x" "y" "t"',
+        "kinds: list domain domain",
     ],
 )
 def test_a_time_as_an_axis_is_no_volume(tmp_path, line):
