@@ -21,6 +21,7 @@ from alphacut.base.csv_columns import NUMBER
 from alphacut.base.errors import RefusedError, path_of, printable, require
 from alphacut.base.memory import require_free_memory, require_text
 from alphacut.base.stated import Stated, require_overrides, settled
+from alphacut.frame.records.stated import FACTOR
 from alphacut.frame.structures.entry_lists import (
     NamedMatrix,
     chosen_place,
@@ -118,30 +119,39 @@ def _stated_factor(path: Path) -> float:
     if path.suffix.lower() not in (".mtx", ".csv", ".pch", ".bdf", ".nas", ".sti", ".mas"):
         return 1.0
     stated = []
-    force = r"(?:[kMG]?N|lbf?|kips?|kgf|tonf?|dyn)"
+    force = r"(?:(?:da|[kMG])?N|lbf?|kips?|kgf|tonf?|dyn)"
     length = r"(?:mm|cm|m|in|ft|inch|inches)"
     quotient = rf"(?<![\w./]){force}\s*(?:\(?[-*·. ]?\s*s(?:\^|\*\*)?[2²]?\)?\s*)?/\s*{length}\b"
-    sure = r"\btonnes?\b|\b[kMG]Pa\b|\bksi\b|\bpsi\b"
+    quotient += rf"|(?<![\w./]){force}[-*·. ]{{0,3}}(?:mm|cm|m|ft)\b"
+    sure = (
+        r"tonnes?|[kMG]Pa|ksi|psi|kips?|inch|inches|pounds?|slugs?|daN|[kMG]N(?!\s*/)|flexibility"
+    )
+    sure = rf"(?<![\w./])(?<!\d )(?:{sure})\b"
+    behind_in = rf"\bin\s+({force}|mm|cm|m|ft|t|tons?|kg|g)(?![\w./])"
     word = rf"(?<![\w./])(?:{force}|{length}|t|tons?|Mg|kg|g|slugs?)(?![\w.])"
     spelled = {"kilo-?newtons?": "kN", "mega-?newtons?": "MN", r"\bnewtons?": "N"}
     spelled |= {r"milli-?met(?:er|re)s?": "mm", r"\bmet(?:er|re)s?": "m", r"\s+per\s+": "/"}
     factors = {"k": 1e3, "M": 1e6, "G": 1e9, "N": 1.0, "t": 1e3}
     cure = "write the matrix in N, m, kg, or say override = ['unit'] if the comment is wrong"
     content = path.read_bytes()
-    for comment in re.finditer(rb"(?m)^[ \t]*(?:%(?!%MatrixM)|[#$]|\*\*|//).*$", content):
-        line = comment[0].decode("latin-1")
+    for comment in re.finditer(rb"(?m)(?:^[ \t]*(?:%(?!%MatrixM)|\$|\*\*|//)|#).*$", content):
+        line = comment[0].decode("utf-8", "replace")
         row = content.count(b"\n", 0, comment.start()) + 1
         place = f"{path.name}, line {row}"
         for pattern, symbol in spelled.items():
             line = re.sub(pattern, symbol, line, flags=re.IGNORECASE)
-        units = re.findall(quotient, line) + re.findall(sure, line)
+        units = [*re.findall(quotient, line), *re.findall(sure, line)]
+        units += re.findall(behind_in, line)
         if re.search(r"(?i)\bunits?\b|[\[(]", line):
             units += re.findall(word, line)
-        has_factor = units and re.search(r"1e\d|10\s*(?:\^|\*\*)|[x×*]\s*10", line)
+        has_factor = re.search(FACTOR, line, re.IGNORECASE)
+        has_factor = has_factor and (units or re.search("(?i)scal|multipl|divi", line))
         require(not has_factor, place, line.strip()[:60], "units without a factor", cure)
         for unit in units:
             text = re.sub(r"\s", "", unit)
-            is_metric = re.fullmatch(r"[kMG]?N.*/m|[kMG]?N|m|kg|t|tonnes?|Mg", text) is not None
+            is_metric = (
+                re.fullmatch(r"[kMG]?N|[kMG]?N(?:.*[^cm])?m|m|kg|t|tonnes?|Mg", text) is not None
+            )
             require(is_metric, place, f"in {text}", "units of SI, or kN and t with m", cure)
             if text != "m":
                 value = {"Mg": 1e3, "kg": 1.0}.get(text) or factors[text[0]]
