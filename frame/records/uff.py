@@ -11,11 +11,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from itertools import takewhile
+from math import isclose
 
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
+from alphacut.base.stated import METRES
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated import named_quantity
 from alphacut.frame.records.text_file import NUMBER, choose_channel, decoded, recording_in_si
@@ -53,7 +55,7 @@ def read_uff_record(name: str, content: bytes, channel: str = "", unit: str = ""
         channel: NODE.DIRECTION of the response, as "7.x", in any capitals; empty where there is
             one. Of several data sets of one response it is "7.x#1", "7.x#2" …, or the first line of
             their heads.
-        unit: Unit of a data set that states none.
+        unit: Unit of a data set that states none, in a file without a system of units (164).
 
     Returns:
         The recording, with samples in m/s². Its channel is NODE.DIRECTION.
@@ -93,8 +95,22 @@ def read_uff_record(name: str, content: bytes, channel: str = "", unit: str = ""
     # Line 9 of the head is of the ordinate and has its unit in columns 48 to 67.
     own_unit = found[chosen].head[8][47:67].strip()
     if own_unit.upper() in ("", "NONE"):
-        own_unit = unit
+        own_unit = _unit_of_system(content) or unit
     return recording_in_si(key, "UFF 58", own_unit, step, history.samples, responses[chosen])
+
+
+def _unit_of_system(content: bytes) -> str:
+    """Return the unit of accelerations in the system of units that a data set 164 states, or "".
+
+    Its second line begins with the number of units of length in a metre.
+    """
+    for system in data_sets(content, 164):
+        per_metre = floats(system.head[1])[0]
+        for length in ("m", "cm", "mm", "in", "ft"):
+            if isclose(per_metre * METRES[length], 1, rel_tol=1e-3):
+                return f"{length}/s^2"
+        raise ValueError(f"in a system of {per_metre:g} units of length in a metre")
+    return ""
 
 
 def _response(data_set: DataSet) -> str:
@@ -191,19 +207,21 @@ def data_sets(content: bytes, number: int) -> Iterator[DataSet]:
 
     Args:
         content: The file.
-        number: 55 or 2414 (modes and other data at nodes), or 58 (functions, as time histories).
+        number: 55 or 2414 (modes and other data at nodes), 58 (functions, as time histories), or
+            164 (units).
 
     Yields:
-        The data set: `head`, the 8 (55), 11 (58) or 13 (2414) lines of its head, and `lines`, its
-        values. A binary one has no lines; the bytes of its values are `content`, which is None
-        otherwise, and their `byte_order` is ">" or "<". If the file is cut off, values are missing.
+        The data set: `head`, the 8 (55), 11 (58), 2 (164) or 13 (2414) lines of its head, and
+        `lines`, its values. A binary one has no lines; the bytes of its values are `content`, which
+        is None otherwise, and their `byte_order` is ">" or "<". If the file is cut off, values are
+        missing.
 
     Raises:
         ValueError: A data set of the number ends inside its head, or the line of a binary one does
             not count its bytes.
         KeyError: `number` is another one.
     """
-    head_lines = {55: 8, 58: 11, 2414: 13}[number]
+    head_lines = {55: 8, 58: 11, 164: 2, 2414: 13}[number]
     file = BytesIO(content)
     while line := file.readline():
         if line.strip() != b"-1":

@@ -144,9 +144,15 @@ def _stated_factor(path: Path) -> float:
         units += re.findall(behind_in, line)
         if re.search(r"(?i)\bunits?\b|[\[(]", line):
             units += re.findall(word, line)
-        has_factor = re.search(FACTOR, line, re.IGNORECASE)
-        has_factor = has_factor and (units or re.search("(?i)scal|multipl|divi", line))
-        require(not has_factor, place, line.strip()[:60], "units without a factor", cure)
+        has_factor = re.search(FACTOR, line, re.IGNORECASE) is not None
+        is_of_numbers = bool(units) or re.search("(?i)scal|multipl|divi", line) is not None
+        require(
+            not (has_factor and is_of_numbers),
+            place,
+            line.strip()[:60],
+            "units without a factor",
+            cure,
+        )
         for unit in units:
             text = re.sub(r"\s", "", unit)
             is_metric = (

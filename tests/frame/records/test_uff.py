@@ -115,6 +115,19 @@ def test_a_data_set_that_ends_in_its_head_is_told_why(tmp_path):
         read_record(saved(tmp_path, start + b"NONE\n"))
 
 
+def test_a_system_of_units_is_that_of_a_data_set_without_one(tmp_path):
+    system = b"    -1\n   164\n         5 mm                           2\n"
+    system += (
+        b"  1.00000000000000000D+03  1.00000000000000000D+00  1.00000000000000000D+00\n    -1\n"
+    )
+    path = saved(tmp_path, system + uff58(WAVE, unit="NONE"))
+    assert read_record(path).samples == pytest.approx(WAVE / 1000, abs=1e-8)
+    with refuses("record.uff"):
+        read_record(path, unit="g")
+    path = saved(tmp_path, system.replace(b"D+03", b"D+02", 1) + uff58(WAVE, unit="m/s^2"))
+    assert read_record(path).samples == pytest.approx(WAVE, abs=1e-5)
+
+
 def test_a_name_of_another_quantity_is_refused_where_code_and_unit_say_nothing(tmp_path):
     path = tmp_path / "record.uff"
     content = uff58(np.sin(np.arange(40) / 5), unit="NONE", spec=0)
