@@ -7,6 +7,7 @@ says that the file is wrong.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from math import isclose
@@ -87,6 +88,17 @@ def settled(
             cure = f'mend one, or say {key} and override = ["{key}"]'
             raise RefusedError(name, f"of {key} {first} and {each}", f"one {key}", cure)
     return first or said
+
+
+def warn_of_overrides(name: str, override: Collection[str]) -> None:
+    """Warn that what a file states of some keys does not count, as its user says.
+
+    Args:
+        name: Name of the file.
+        override: The keys.
+    """
+    for key in override:
+        warnings.warn(f"of {name} what it states of its {key} is overridden", stacklevel=3)
 
 
 def require_overrides(override: object, allowed: Collection[str]) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from alphacut.base.errors import checked_number, path_of, require
-from alphacut.base.stated import require_overrides
+from alphacut.base.stated import require_overrides, warn_of_overrides
 from alphacut.frame.identification.mode_rows import mode_rows
 from alphacut.frame.identification.modes import MeasuredMode, measured_mode
 from alphacut.frame.identification.uff_modes import uff_mode_rows
@@ -65,6 +65,7 @@ def read_modes(
         found = uff_mode_rows(file, floors or {})
     else:
         require(not floors, "floors", floors, "left out beside a CSV file")
+        warn_of_overrides(file.name, override)
         found = mode_rows(file, frequency_unit, override)
     modes = []
     for rows in found:

@@ -20,7 +20,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.csv_columns import NUMBER
 from alphacut.base.errors import RefusedError, path_of, printable, require
 from alphacut.base.memory import require_free_memory, require_text
-from alphacut.base.stated import Stated, require_overrides, settled
+from alphacut.base.stated import Stated, require_overrides, settled, warn_of_overrides
 from alphacut.frame.records.stated import FACTOR
 from alphacut.frame.structures.entry_lists import (
     NamedMatrix,
@@ -84,6 +84,7 @@ def read_matrix(
     require_overrides(override, ("unit",))
     file = path_of("path", path)
     array, names = _read_named(file, name, max_rows=max_rows)
+    warn_of_overrides(file.name, override)
     factor = 1.0 if override else _stated_factor(file)
     if names and unknowns:
         array = _arranged(file.name, array, names, unknowns)

@@ -17,6 +17,7 @@ from alphacut.base.array_files import read_npy
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.pictures import opened_picture
+from alphacut.base.stated import warn_of_overrides
 from alphacut.rve.image.memory import require_memory
 from alphacut.rve.image.raw import HEADS, data_of_head, read_head
 from alphacut.rve.image.stack import read_stack
@@ -48,6 +49,7 @@ def read_grid(path: Path, sides: Sequence[float], override: Collection[str] = ()
             other sides of a voxel, or other ratios of those of a pixel.
     """
     dimension = len(sides)
+    warn_of_overrides(path.name, override)
     take_voxel = "a volume takes cell.voxel in place of cell.pixel"
     if dimension == 2:
         allowed_file = "an image or an array"

@@ -134,5 +134,6 @@ def test_the_unit_of_frequencies_is_stated_or_asked_for(tmp_path, head, unit, fa
 
 def test_a_wrong_unit_of_a_file_is_overridden(tmp_path):
     path = written(tmp_path, "mode,frequency [kHz],q1,q2\n1,1.5,0.5,1\n2,4,-1,0.5\n")
-    modes = read_modes(path, frequency_unit="Hz", override=["frequency_unit"])
+    with pytest.warns(UserWarning, match="of modes.csv what it states of its frequency_unit"):
+        modes = read_modes(path, frequency_unit="Hz", override=["frequency_unit"])
     assert modes[0].frequency.nominal == 1.5

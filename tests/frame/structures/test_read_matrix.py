@@ -254,6 +254,7 @@ def test_units_in_comments_are_turned_to_si_or_refused(tmp_path, name, comment, 
     if factor is None:
         with pytest.raises(RefusedError):
             read_matrix(path)
-        assert read_matrix(path, override=["unit"]).tolist() == matrix
+        with pytest.warns(UserWarning, match=f"of {name} what it states of its unit"):
+            assert read_matrix(path, override=["unit"]).tolist() == matrix
     else:
         assert read_matrix(path) == pytest.approx(factor * np.array(matrix))

@@ -430,7 +430,8 @@ def test_units_of_single_axes_are_compared_and_may_be_overridden(tmp_path, rng):
     wrong = (16.5 * NM, 16.5 * NM, 0.025 * NM)  # along x, y, z
     with refuses("a.tif"):
         read_image(path, spacing=wrong)
-    assert read_image(path, spacing=wrong, override=["voxel"]).lengths == wrong[::-1]
+    with pytest.warns(UserWarning, match="of a.tif what it states of its voxel is overridden"):
+        assert read_image(path, spacing=wrong, override=["voxel"]).lengths == wrong[::-1]
 
 
 @pytest.mark.parametrize(
