@@ -7,6 +7,7 @@ from scipy.linalg import eigh
 from alphacut.frame import Auto, DualProof, Force, History, Proof, StoreyFrame, envelope
 from alphacut.frame.verification.self_test import structures_at
 from alphacut.fuzzy import FailedError, Interval
+from tests.frame.motions import random_points
 
 STEPS = 8
 
@@ -146,3 +147,32 @@ def test_what_a_model_errs_of_a_force_that_vanishes_at_nodes_is_counted(start, g
     spring = 1e-6 * start / 0.65
     reached = 1 / 0.65 - spring
     assert bounds.upper[0, :2, 0].max() + bounds.between[1, 0] >= reached - 1e-7
+
+
+@pytest.mark.parametrize("count", [5, 7], ids=["inner node", "last node"])
+@pytest.mark.parametrize("method", [Proof(workers=1), DualProof(workers=1)], ids=["proof", "dual"])
+def test_bounds_before_a_jump_of_a_force_at_a_node_hold_and_count_it_once(method, count, rng):
+    """With it the acceleration jumps, by far more than motions lie beyond their nodes."""
+    step, steps = 0.02, 30
+    samples = rng.uniform(1.0, 1.6, count)
+    samples[-1] = 3.0  # the force rises until it ends, so that motions exceed both nodes there
+    frame = StoreyFrame(
+        [6e4, 5e4],
+        stiffness=[6e7, 3e7],
+        damping_ratio=0.02,
+        outputs=("a1", "a2"),
+        loads=[Force(2, 1.2e4, History(0.1, samples))],
+    )
+    inputs = {"k2": Interval(2.97e7, 3.03e7), "F2": Interval(1.19e4, 1.21e4)}
+    given = {"duration": steps * step, "step": step, "alpha": [0.0], "progress": False}
+    bounds = envelope(frame, inputs, method, **given)
+    end = round(0.1 * (count - 1) / step)
+    fractions = np.append(np.arange(20) / 20, 1 - 1e-9)
+    times = (end - 1 + fractions) * step
+    for motion in structures_at(frame, tuple(inputs), random_points(inputs, 12, rng)):
+        values = motion.outputs(np.append(times, end * step)).values
+        for sign, at_nodes in ((1.0, bounds.upper[0]), (-1.0, -bounds.lower[0])):
+            bound = np.maximum(at_nodes[end - 1], at_nodes[end]) + bounds.between[end]
+            assert (sign * values <= bound + 1e-9).all()
+    jump = 1.2e4 * samples[-1] / 5e4
+    assert bounds.between[end, 1] <= 1.1 * jump
