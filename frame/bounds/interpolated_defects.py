@@ -9,11 +9,13 @@ grid of inputs have it as their last axis; e counts elements, k powers of τ.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.frame.bounds.interpolated_motions import LOAD_TERMS, Elements
+from alphacut.frame.bounds.interpolated_motions import LOAD_TERMS, Elements, composed
 from alphacut.frame.calculus.interpolation import (
     along_inputs,
     bernstein_matrix,
@@ -23,6 +25,8 @@ from alphacut.frame.calculus.interpolation import (
     part_maxima,
     refining_matrix,
 )
+
+Values = TypeVar("Values")
 
 # Parts of each input over which S is kept, by the number of inputs (tuned: a left-out event moves
 # the slider in a corner of the box alone, and the peak may lie elsewhere).
@@ -35,13 +39,27 @@ SMALL_VIOLATION = 1e-9
 REVERSAL_PARTS = 32
 
 
-@dataclass(frozen=True, eq=False)
-class BoxModel:
-    """Properties of a frame of N floors over a box, as polynomials on a grid, with bounds.
+class Properties(NamedTuple, Generic[Values]):
+    """Properties of a frame of N floors: over a box, at the points of a grid, or bounds of them.
 
     A storey z has the stiffness κ_z after yielding, less weight over height (of an elastic storey:
-    its stiffness less weight over height), and the yielding one a slider of the stiffness K_z
-    beside it. Each property is a polynomial but for a remainder.
+    its stiffness less weight over height), and the yielding one a slider beside it.
+    """
+
+    mass: Values  # M, (N,), in kg
+    inverse_mass: Values  # (N,), in 1/kg
+    damping: Values  # C, (N, N), in N s/m
+    decay: Values  # D = M⁻¹ C, (N, N), in 1/s
+    stiffness: Values  # κ, (N,), in N/m
+    slider: Values  # K_z, (), in N/m
+    force: Values  # yield force of the slider, (), in N
+    q0: Values  # initial displacements, (N,), in m
+    v0: Values  # initial velocities, (N,), in m/s
+
+
+@dataclass(frozen=True, eq=False)
+class BoxModel:
+    """A frame of N floors over a box: its properties are polynomials but for a remainder.
 
     Args:
         inputs: Number d of inputs.
@@ -50,21 +68,11 @@ class BoxModel:
         of_slider: Degree of the slider's force in each input.
         place: Number of the yielding storey.
         follow: w, accelerations of the floors under a unit of each load, shape (L, N).
-        mass: Values on the grid, shape (N, F), in kg.
-        stiffness: κ on the grid, shape (N, F), in N/m.
-        damping: C on the grid, shape (N, N, F), in N s/m.
-        slider: K_z on the grid, shape (F,), in N/m.
-        force: Yield force of the slider on the grid, shape (F,), in N.
-        mass_remainder: Shape (N,), as those that follow.
-        stiffness_remainder: Shape (N,).
-        damping_remainder: Shape (N, N).
-        slider_remainder: A number, as the next one.
-        force_remainder: In N.
-        mass_ends: Lower and upper bounds, shape (2, N), as the next one.
-        stiffness_ends: Lower bounds are not negative.
-        slider_ends: Shape (2,), as the next one; lower bounds are positive.
-        force_ends: In N.
-        max_damping: Bounds of |C|, shape (N, N).
+        at_sets: Properties at the parameter sets of the motions.
+        grid: Properties on the grid.
+        low: Lower bounds; those of κ are not negative, those of masses and of the slider positive.
+        high: Bounds of magnitudes.
+        missed: Bounds of what the polynomials of properties miss.
     """
 
     inputs: int
@@ -73,26 +81,11 @@ class BoxModel:
     of_slider: int
     place: int
     follow: Array
-    mass: Array
-    stiffness: Array
-    damping: Array
-    slider: Array
-    force: Array
-    mass_remainder: Array
-    stiffness_remainder: Array
-    damping_remainder: Array
-    slider_remainder: float
-    force_remainder: float
-    mass_ends: Array
-    stiffness_ends: Array
-    slider_ends: Array
-    force_ends: Array
-    max_damping: Array
-
-    @property
-    def floors(self) -> int:
-        """Number N of floors."""
-        return len(self.mass)
+    at_sets: Properties[Array]
+    grid: Properties[Array]
+    low: Properties[Array]
+    high: Properties[Array]
+    missed: Properties[Array]
 
     @property
     def parts(self) -> int:
@@ -103,15 +96,18 @@ class BoxModel:
     def direction_norm(self) -> float:
         """Bound of (bᵀ M⁻¹ b)^½, with the drift bᵀ q of the yielding storey."""
         z = self.place
-        total = 1 / self.mass_ends[0, z]
-        if z:
-            total += 1 / self.mass_ends[0, z - 1]
-        return float(np.sqrt(total))
+        return float(np.sqrt(self.high.inverse_mass[max(z - 1, 0) : z + 1].sum()))
+
+    def elastic_stiffness(self, of: Properties[Array]) -> Array:
+        """Return the sum of bounds of all storeys' stiffness and of that of the slider, (N,)."""
+        found = of.stiffness.copy()
+        found[self.place] += of.slider
+        return found
 
     @property
-    def following_drift(self) -> Array:
-        """|bᵀ w| of each load, shape (L,)."""
-        return np.abs(drifts(self.follow, axis=1)[:, self.place])
+    def following_drifts(self) -> Array:
+        """Magnitudes of the drifts of w, shape (L, N)."""
+        return np.abs(drifts(self.follow, axis=1))
 
     def refined(self, values: Array) -> Array:
         """Return what interpolates values at the parameter sets of the motions, on the grid."""
@@ -124,6 +120,11 @@ class BoxModel:
     def part_maxima(self, values: Array, degree: int) -> Array:
         """Bound polynomials of a degree on each part of the box, shape (…, parts)."""
         return part_maxima(values, self.inputs, self.fine, self.parts, degree)
+
+    def ranges(self, values: Array) -> tuple[Array, Array]:
+        """Return midpoints and radii of intervals of polynomials over the box, shape (…) each."""
+        found = coefficients(values, self.inputs, self.fine)
+        return found[..., 0], np.abs(found[..., 1:]).sum(axis=-1)
 
     def largest(self, values: Array) -> Array:
         """Bound what interpolates values at the parameter sets of the motions, shape (…).
@@ -147,11 +148,13 @@ class Interpolant:
         length: Lengths of elements, shape (e, F), in s.
         max_length: Upper bounds of them, shape (e,).
         phase: Direction of yielding or 0, shape (e,).
+        event: Side of the event at the end, or 0, shape (e,).
         constant: c of an elastic storey, before an element or behind it, shape (e, F), in N.
         path: See `Elements`, shape (e, F), in m.
         load_error: Bounds of |g − the polynomials in τ and inputs that stand for it|, (e, L), in m.
         load_variation: Bounds of the derivative by τ of g − these, shape (e, L), in m.
-        load_rate: What interpolates g' at the inputs, shape (e, LOAD_TERMS, L, F), in m/s.
+        load_rate: What interpolates g' at the inputs, shape (e, LOAD_TERMS, L, F), in m/s; without
+            loads if it is not asked for.
         rate_error: Bounds of |g' − this|, shape (e, L).
         max_relative: Bounds of |q| by powers of τ, shape (e, K, N).
         times: Earliest and latest begin, earliest and latest end, shortest and greatest length of
@@ -166,6 +169,7 @@ class Interpolant:
     length: Array
     max_length: Array
     phase: Ints
+    event: Ints
     constant: Array
     path: Array
     load_error: Array
@@ -175,56 +179,72 @@ class Interpolant:
     max_relative: Array
     times: Array
 
+    @cached_property
+    def drifts(self) -> Array:
+        """Drifts of all storeys, shape (e, K, N, F), in m."""
+        return drifts(self.relative, axis=2)
+
     @property
     def drift(self) -> Array:
         """Drift of the yielding storey, shape (e, K, F), in m."""
-        return storey_drift(self.relative, self.model.place)
+        return self.drifts[:, :, self.model.place]
 
-    @property
-    def slider_force(self) -> Array:
-        """K_z bᵀ q − c of an elastic storey, shape (e, K, F), in N."""
-        force = self.model.slider * self.drift
+    @cached_property
+    def elastic_force(self) -> Array:
+        """K_z bᵀ q − c, shape (e, K, F), in N."""
+        force = self.model.grid.slider * self.drift
         force[:, 0] -= self.constant
         return force
 
+    @cached_property
+    def slider_force(self) -> Array:
+        """Force of the slider, of an elastic or a yielding storey, shape (e, K, F), in N."""
+        force = np.where(self.phase[:, np.newaxis, np.newaxis] == 0, self.elastic_force, 0.0)
+        force[:, 0] += self.phase[:, np.newaxis] * self.model.grid.force
+        return force
 
-@dataclass(frozen=True, eq=False)
-class Defects:
-    """Bounds of the defects of some elements, each integrated over the element.
+    @cached_property
+    def absolute_velocity(self) -> Array:
+        """M⁻¹ P − D q, shape (e, K, N, F), in m/s."""
+        velocity = self.model.grid.inverse_mass * self.momentum
+        for i, j in np.argwhere(self.model.grid.decay.any(axis=-1)):
+            velocity[:, :, i] -= self.model.grid.decay[i, j] * self.relative[:, :, j]
+        return velocity
 
-    Args:
-        growth: Growth of S at all inputs, shape (e,), in J^½.
-        violation: Growth of S on each part of the box where an event is left out, (e, parts).
-        drift: Bound of ∫ |bᵀ δ_q| dt, shape (e,), in m.
-        path: By how much the length of the plastic path may differ from that of a flow that obeys
-            the flow rule, shape (e,), in m.
-        beyond: By how much the slider may be beyond its yield force, shape (e, parts), in N.
-        level: What polynomials of the slider's force miss, shape (e,), in N.
-    """
+    @cached_property
+    def velocity_error(self) -> Array:
+        """Bounds of what this misses, shape (e, N), in m/s."""
+        model = self.model
+        missed = self.load_error @ np.abs(model.follow) @ model.high.decay.T
+        missed += self.max_relative.sum(axis=1) @ model.missed.decay.T
+        return missed + model.missed.inverse_mass * model.largest(self.momentum).sum(axis=1)
 
-    growth: Array
-    violation: Array
-    drift: Array
-    path: Array
-    beyond: Array
-    level: Array
+
+class Defects(NamedTuple):
+    """Bounds of the defects of some elements, each integrated over the element."""
+
+    growth: Array  # growth of S at all inputs, (e,), in J^½
+    violation: Array  # growth of S on each part of the box where an event is left out, (e, parts)
+    drift: Array  # bound of ∫ |bᵀ δ_q| dt, (e,), in m
+    path: Array  # by how much the plastic path differs from that of a flow by the rule, (e,), in m
+    beyond: Array  # by how much the slider may be beyond its yield force, (e, parts), in N
+    level: Array  # what polynomials of the slider's force miss, (e,), in N
 
 
 def drifts(values: Array, axis: int) -> Array:
     """Return the differences of neighbouring floors along an axis, the first one to the ground."""
-    zero = np.zeros_like(values.take([0], axis=axis))
-    return np.diff(values, axis=axis, prepend=zero)
+    return np.diff(values, axis=axis, prepend=0.0)
 
 
-def storey_drift(values: Array, place: int) -> Array:
-    """Return the drift of one storey of displacements of shape (e, K, N, …)."""
-    if place == 0:
-        return values[:, :, 0].copy()
-    return values[:, :, place] - values[:, :, place - 1]
+def max_drifts(values: Array) -> Array:
+    """Return bounds of the drifts of what is bounded by `values` at each floor, shape (…, N)."""
+    found: Array = values.copy()
+    found[..., 1:] += values[..., :-1]
+    return found
 
 
 def interpolate(
-    model: BoxModel, elements: Elements, chosen: slice, *, with_rates: bool
+    model: BoxModel, elements: Elements, chosen: slice | Ints, *, with_rates: bool
 ) -> Interpolant | None:
     """Return the interpolated motions on some elements, or None where their times go astray.
 
@@ -235,7 +255,7 @@ def interpolate(
         model: The frame over the box.
         elements: Motions at its parameter sets.
         chosen: Which elements.
-        with_rates: Whether the error of the rates of the loads is bounded, which velocities need.
+        with_rates: Whether the rates of the loads are found, which velocities need.
     """
     begin = elements.begin[chosen]
     length = elements.length[chosen]
@@ -247,35 +267,31 @@ def interpolate(
         box_maxima(ends, model.inputs, model.degree),
     )
     times[:, ::2] *= -1.0
+    max_length = times[:, 5]
     # The margin is rounding, which the widening of all bounds covers.
     margin = 1e-10 * (1 + np.abs(span).sum(axis=1))
     within = times[:, 0] >= span[:, 0] - span[:, 1] - margin
     within &= times[:, 3] <= span[:, 0] + span[:, 1] + margin
     if not (within & (times[:, 4] >= 0)).all():
         return None
-    n = model.floors
-    terms = max(int(elements.terms[chosen].max(initial=0)), LOAD_TERMS)
+    # Polynomials of loads, and of their rates, by powers of (t − midpoint) / radius.
+    fit = elements.fit[chosen]
+    n_loads = fit.shape[1]
+    if with_rates:
+        rate = np.zeros_like(fit)
+        rate[:, :, :-1] = fit[:, :, 1:] * np.arange(1, LOAD_TERMS) / span[:, 1, None, None]
+        fit = np.concatenate([fit, rate], axis=1)
+    loads, missed = _loads_over_inputs(model, begin, length, span, fit)
+    fit_error = elements.fit_error[chosen]
+    variation = np.arange(LOAD_TERMS) @ missed[:, :, :n_loads]
+    missed = missed.sum(axis=1)
+
+    n = len(model.follow[0])
+    terms = max(int(elements.terms.max(initial=0)), LOAD_TERMS)
     series = elements.series[chosen, :terms]
     relative = series[:, :, :n].copy()
-    relative[:, :LOAD_TERMS] += np.einsum("ln,eklj->eknj", model.follow, elements.load[chosen])
+    relative[:, :LOAD_TERMS] += model.follow.T @ loads[:, :, :n_loads]
     refined = model.refined(np.concatenate([series, relative], axis=2))
-    # Polynomials of the rate of the load, by powers of (t − midpoint) / radius.
-    fit = elements.fit[chosen]
-    rate = np.zeros_like(fit)
-    rate[:, :, :-1] = fit[:, :, 1:] * np.arange(1, LOAD_TERMS) / span[:, 1, np.newaxis, np.newaxis]
-    at_zero = (begin - span[:, :1]) / span[:, 1:]
-    rates = _composed(rate, at_zero, length / span[:, 1:])
-    missed = _composition_errors(model, begin, length, span, fit, elements.load[chosen])
-    missed_rate = np.zeros_like(missed)
-    if with_rates:
-        missed_rate = _composition_errors(model, begin, length, span, rate, rates)
-    fit_error = elements.fit_error[chosen]
-    powers = np.arange(LOAD_TERMS)[:, np.newaxis]
-    max_length = times[:, 5]
-    # At the end of yielding the constant of the elastic storey that follows counts.
-    constant = elements.constant[chosen].copy()
-    for e in np.flatnonzero((elements.phase[chosen] != 0) & (elements.event[chosen] != 0)):
-        constant[e] = elements.constant[chosen.start + e + 1]
     return Interpolant(
         model=model,
         terms=terms,
@@ -285,41 +301,22 @@ def interpolate(
         length=model.refined(length),
         max_length=max_length,
         phase=elements.phase[chosen],
-        constant=model.refined(constant),
+        event=elements.event[chosen],
+        constant=model.refined(elements.constant[chosen]),
         path=model.refined(elements.path[chosen]),
-        load_error=fit_error[..., 0] + missed.sum(axis=1),
-        load_variation=fit_error[..., 1] * max_length[:, np.newaxis]
-        + (powers * missed).sum(axis=1),
-        load_rate=model.refined(rates),
-        rate_error=fit_error[..., 1] + missed_rate.sum(axis=1),
+        load_error=fit_error[..., 0] + missed[:, :n_loads],
+        load_variation=fit_error[..., 1] * max_length[:, np.newaxis] + variation,
+        load_rate=model.refined(loads[:, :, n_loads:]) if with_rates else loads[:, :, n_loads:],
+        rate_error=fit_error[..., 1] + missed[:, -n_loads:],
         max_relative=model.largest(relative),
         times=times,
     )
 
 
-def _composed(fit: Array, at_zero: Array, slope: Array) -> Array:
-    """Return polynomials of s by powers of τ for s = at_zero + τ slope.
-
-    Args:
-        fit: Powers of s, shape (e, L, LOAD_TERMS).
-        at_zero: Shape (e, points).
-        slope: Shape (e, points).
-
-    Returns:
-        Shape (e, LOAD_TERMS, L, points).
-    """
-    e, loads, terms = fit.shape
-    found = np.zeros((terms, e, loads, at_zero.shape[1]))
-    for k in range(terms - 1, -1, -1):  # Horner's rule
-        found[1:] = found[1:] * at_zero[:, np.newaxis] + found[:-1] * slope[:, np.newaxis]
-        found[0] = found[0] * at_zero[:, np.newaxis] + fit[:, :, k, np.newaxis]
-    return found.swapaxes(0, 1)
-
-
-def _composition_errors(
-    model: BoxModel, begin: Array, length: Array, span: Array, fit: Array, series: Array
-) -> Array:
-    """Bound what the interpolation of a load's polynomials over the inputs misses.
+def _loads_over_inputs(
+    model: BoxModel, begin: Array, length: Array, span: Array, fit: Array
+) -> tuple[Array, Array]:
+    """Return loads at the parameter sets, and bounds of what interpolation over inputs misses.
 
     At the inputs u and the fraction τ an element has the time t = t_0(u) + τ h(u), and the load is
     a polynomial of t. So it is one of τ and u, of the degree 7 n in each input with the degree n of
@@ -332,61 +329,86 @@ def _composition_errors(
         length: h at the parameter sets, shape (e, J).
         span: Midpoint and radius of the times of each element, shape (e, 2).
         fit: Powers of (t − midpoint) / radius, shape (e, L, LOAD_TERMS).
-        series: Powers of τ at the parameter sets, shape (e, LOAD_TERMS, L, J).
 
     Returns:
-        Bounds of the difference by powers of τ, shape (e, LOAD_TERMS, L).
+        Powers of τ, shape (e, LOAD_TERMS, L, J), and bounds of the difference by them, without J.
     """
-    errors = np.zeros(series.shape[:3])
+    at_zero = (begin - span[:, :1]) / span[:, 1:]
+    slope = length / span[:, 1:]
+    loads = _composed_elements(fit, at_zero, slope)
+    missed = np.zeros(loads.shape[:3])
     varies = np.flatnonzero((np.ptp(begin, axis=1) > 0) | (np.ptp(length, axis=1) > 0))
-    degree = (LOAD_TERMS - 1) * model.degree
-    refine = refining_matrix(model.degree, degree)
     if len(varies):
-        mid, rad = span[varies].T[..., np.newaxis]
-        at_zero = (along_inputs(refine, begin[varies], model.inputs) - mid) / rad
-        slope = along_inputs(refine, length[varies], model.inputs) / rad
-        exact = _composed(fit[varies], at_zero, slope)
-        exact -= along_inputs(refine, series[varies], model.inputs)
-        errors[varies] = magnitude(exact, model.inputs, degree)
-    return errors
+        degree = (LOAD_TERMS - 1) * model.degree
+        refine = refining_matrix(model.degree, degree)
+        finer = along_inputs(refine, np.stack([at_zero[varies], slope[varies]]), model.inputs)
+        exact = _composed_elements(fit[varies], finer[0], finer[1])
+        exact -= along_inputs(refine, loads[varies], model.inputs)
+        missed[varies] = magnitude(exact, model.inputs, degree)
+    return loads, missed
 
 
-def defects(found: Interpolant, event: Ints, small: float = 0.0) -> Defects:
+def _composed_elements(fit: Array, at_zero: Array, slope: Array) -> Array:
+    """Return the results of `composed` of all elements, shape (e, LOAD_TERMS, L, points)."""
+    found = np.empty((len(fit), LOAD_TERMS, fit.shape[1], at_zero.shape[1]))
+    for e in range(len(fit)):
+        composed(fit[e], at_zero[e], slope[e], found[e])
+    return found
+
+
+def defects(found: Interpolant, small: float = 0.0) -> Defects:
     """Bound the defects of interpolated motions.
 
     Args:
         found: The motions.
-        event: That of `Elements`, shape (e,).
         small: Growth of S by an event that is left out that is not bounded more closely, in J^½.
     """
     model = found.model
-    shape = found.drift.shape[0]
+    low = model.low
+    high = model.high
     growth, drift = _residuals(found)
-    at_events = _jumps(found, event)
-    violation = np.zeros((shape, model.parts**model.inputs))
+    following = model.following_drifts[:, model.place]
+    path = 2 * found.load_error @ following * (found.event != 0)
+    # What polynomials of the slider's force less its yield force miss, and its derivative by τ.
+    by_powers = 2 * model.missed.slider * found.max_relative.sum(axis=2)
+    level = high.slider * (found.load_error @ following) + by_powers.sum(axis=1)
+    level += model.missed.force
+    variation = high.slider * (found.load_variation @ following)
+    variation += by_powers @ np.arange(found.terms)
+
+    # At an event at the end of an element the force, with the constant of the elastic side, should
+    # be ± the yield force. The slider is moved at once by what it misses.
+    at = np.flatnonzero(found.event)
+    if len(at):
+        missed = found.elastic_force[at].sum(axis=1)
+        missed -= found.event[at, np.newaxis] * model.grid.force
+        growth[at] += (model.magnitude(missed) + level[at]) / np.sqrt(low.slider)
+
+    violation = np.zeros((len(growth), model.parts**model.inputs))
     beyond = np.zeros_like(violation)
-    path = 2 * found.load_error @ model.following_drift * (event != 0)
-    level, variation = _slider_errors(found)
-    force = found.slider_force
-    for e in _elastic_violations(found, force, level):
-        moved, beyond[e], forced, rise = _elastic_violation(
-            model, force[e], level[e], variation[e], small
-        )
+    # Mostly the sum of all magnitudes shows that the force of an elastic storey is small enough.
+    elastic = np.flatnonzero(found.phase == 0)
+    control = bernstein_matrix(found.terms - 1) @ found.elastic_force[elastic]
+    middle, radius = model.ranges(control)
+    most = (np.abs(middle) + radius).max(axis=1, initial=0.0) + level[elastic]
+    for e in elastic[most > low.force]:
+        passed = _elastic_violation(model, found.elastic_force[e], level[e], variation[e], small)
+        beyond[e] = passed.most
         # |δ_j| adds up to what the slider falls back, and forces miss what it is beyond meanwhile.
-        forced = forced * found.max_length[e]
-        violation[e] = moved / np.sqrt(model.slider_ends[0]) + model.direction_norm * forced
-        path[e] += rise / model.slider_ends[0]
+        forced = passed.integral * found.max_length[e]
+        violation[e] = passed.falls / np.sqrt(low.slider) + model.direction_norm * forced
+        path[e] += passed.rises.max() / low.slider
     for e, back in _reversals(found):
-        violation[e] = np.sqrt(model.slider_ends[1]) * back
+        violation[e] = np.sqrt(high.slider) * back
         path[e] += back.max()
-    level = np.where(found.phase == 0, level, model.force_remainder)
-    return Defects(growth + at_events, violation, drift, path, beyond, level)
+    level = np.where(found.phase == 0, level, model.missed.force)
+    return Defects(growth, violation, drift, path, beyond, level)
 
 
 def _residuals(found: Interpolant) -> tuple[Array, Array]:
     """Bound what kinematics and the balance of forces miss.
 
-    With powers of τ the residuals are h δ_q = X' − h M⁻¹ (P − C q) and h δ_P = P' + h (K_p q + b r)
+    With powers of τ the residuals are h δ_q = X' − h (M⁻¹ P − D q) and h δ_P = P' + h (K_p q + b r)
     of each power. Then δ_v = δ_P − C δ_q, and S grows by ‖δ_v‖ in M⁻¹ and ‖δ_q‖ in K_e = K_p + K_z
     b bᵀ. Integrated over τ a power k has the factor 1 / (k + 1).
 
@@ -394,144 +416,51 @@ def _residuals(found: Interpolant) -> tuple[Array, Array]:
         Growth of S, shape (e,), and ∫ |bᵀ δ_q| dt, shape (e,).
     """
     model = found.model
-    n = model.floors
     z = model.place
-    h = found.length[:, np.newaxis]
-    order = np.arange(1, found.terms)[:, np.newaxis]
-    elastic = (found.phase == 0)[:, np.newaxis, np.newaxis]
-    K = found.relative.shape[1]
-
-    kinematic = -h[:, :, np.newaxis] * found.momentum
-    balance = np.zeros_like(kinematic)
-    kinematic[:, :-1] += order[..., np.newaxis] * model.mass * found.displacement[:, 1:]
-    balance[:, :-1] += order[..., np.newaxis] * found.momentum[:, 1:]
-    for i in range(n):
-        for j in range(n):
-            if model.damping[i, j].any():
-                kinematic[:, :, i] += h * model.damping[i, j] * found.relative[:, :, j]
-    for storey in range(n):
-        force = model.stiffness[storey] * storey_drift(found.relative, storey)
-        if storey == z:
-            slider = np.where(elastic, model.slider * found.drift, 0.0)
-            yielding = found.phase[:, np.newaxis] * model.force
-            slider[:, 0] += np.where(elastic[:, 0], -found.constant, yielding)
-            force += slider
-        force *= h
-        balance[:, :, storey] += force
-        if storey:
-            balance[:, :, storey - 1] -= force
-    mean_mass = model.mass_ends.mean(axis=0)
-    drift_defect = model.magnitude(drifts(kinematic / mean_mass[:, np.newaxis], axis=2))
+    h = found.length[:, np.newaxis, np.newaxis]
+    order = np.arange(1, found.terms)[:, np.newaxis, np.newaxis]
+    kinematic = -h * found.absolute_velocity
+    kinematic[:, :-1] += order * found.displacement[:, 1:]
+    drift_defect = model.magnitude(drifts(kinematic, axis=2))
+    balance = model.grid.stiffness * found.drifts
+    balance[:, :, z] += found.slider_force
+    balance *= h
+    balance[:, :, :-1] -= balance[:, :, 1:]  # a floor is held from below and pulled from above
+    balance[:, :-1] += order * found.momentum[:, 1:]
     force_defect = model.magnitude(balance)
 
     # What remainders of the properties and errors of the load add, as terms of the power 0.
     longest = found.max_length[:, np.newaxis]
-    followed = np.abs(model.follow)
-    missed = found.load_error @ followed  # (e, N), of q
-    largest = found.max_relative.sum(axis=1)
-    speed = (order * model.largest(found.displacement[:, 1:])).sum(axis=1)
-    more_kinematic = speed * model.mass_remainder
-    more_kinematic += longest * (missed @ model.max_damping)
-    more_kinematic += longest * (largest @ model.damping_remainder)
-    stiffest = model.stiffness_ends[1].copy()
-    stiffest[z] += model.slider_ends[1]
-    remainder = model.stiffness_remainder.copy()
-    remainder[z] += model.slider_remainder
-    drift_missed = found.load_error @ np.abs(drifts(model.follow, axis=1))
-    largest_drift = np.abs(drifts_bound(largest))
-    storey_force = longest * (drift_missed * stiffest + largest_drift * remainder)
-    storey_force[:, z] += longest[:, 0] * model.force_remainder
-    more_force = storey_force.copy()
-    more_force[:, :-1] += storey_force[:, 1:]
-    more_floor = more_kinematic / model.mass_ends[0]
-    drift_defect[:, 0] += drifts_bound(more_floor)
-    force_defect[:, 0] += more_force
+    drift_defect[:, 0] += max_drifts(longest * found.velocity_error)
+    stiffest = model.elastic_stiffness(model.high)
+    storey_force = found.load_error @ model.following_drifts * stiffest
+    largest = max_drifts(found.max_relative.sum(axis=1))
+    storey_force += largest * model.elastic_stiffness(model.missed)
+    storey_force[:, z] += model.missed.force
+    storey_force *= longest
+    force_defect[:, 0] += storey_force
+    force_defect[:, 0, :-1] += storey_force[:, 1:]
 
-    # |δ_q| of a floor is at most the sum of its drifts below. The residuals were divided by the
-    # mean mass m̄; the true one differs from that by the factor m̄ / m.
-    floor_defect = drift_defect.cumsum(axis=2)
-    excess = np.maximum(mean_mass / model.mass_ends[0] - 1, 1 - mean_mass / model.mass_ends[1])
-    if excess.any():
-        drift_defect = drift_defect + drifts_bound(floor_defect * excess)
-        floor_defect = drift_defect.cumsum(axis=2)
-    force_defect = force_defect + floor_defect @ model.max_damping
-    by_power = np.sqrt((force_defect**2 / model.mass_ends[0]).sum(axis=-1))
+    # |δ_q| of a floor is at most the sum of its drifts below.
+    force_defect = force_defect + drift_defect.cumsum(axis=2) @ model.high.damping
+    by_power = np.sqrt((force_defect**2 * model.high.inverse_mass).sum(axis=-1))
     by_power += np.sqrt((drift_defect**2 * stiffest).sum(axis=-1))
-    weights = 1 / np.arange(1, K + 1)
+    weights = 1 / np.arange(1, found.terms + 1)
     return by_power @ weights, drift_defect[:, :, z] @ weights
 
 
-def drifts_bound(values: Array) -> Array:
-    """Return bounds of the drifts of what is bounded by `values` at each floor, shape (…, N)."""
-    found: Array = values.copy()
-    found[..., 1:] += values[..., :-1]
-    return found
+class _Violation(NamedTuple):
+    """What is left out where the slider of an elastic storey passes its yield force, in N."""
 
-
-def _jumps(found: Interpolant, event: Ints) -> Array:
-    """Bound by how much the slider is moved at once at events, times √K_z, shape (e,).
-
-    At an event at the end of an element its force, K_z bᵀ q − c with the constant of the elastic
-    side, should be ± its yield force.
-    """
-    model = found.model
-    jumps = np.zeros(len(event))
-    at = np.flatnonzero(event)
-    if not len(at):
-        return jumps
-    force = model.slider * found.drift[at].sum(axis=1) - found.constant[at]
-    force -= event[at, np.newaxis] * model.force
-    missed = model.magnitude(force)
-    missed += model.slider_ends[1] * (found.load_error[at] @ model.following_drift)
-    largest = 2 * found.max_relative[at].sum(axis=(1, 2))
-    missed += model.slider_remainder * largest + model.force_remainder
-    jumps[at] = missed / np.sqrt(model.slider_ends[0])
-    return jumps
-
-
-def _slider_errors(found: Interpolant) -> tuple[Array, Array]:
-    """Bound what polynomials of the slider's force less its yield force miss, in N.
-
-    Returns:
-        Bounds of the error and of its derivative by τ, shape (e,) each.
-    """
-    model = found.model
-    stiffest = model.slider_ends[1]
-    largest = 2 * found.max_relative.sum(axis=2)  # of the drift, by powers
-    level = stiffest * (found.load_error @ model.following_drift) + model.force_remainder
-    level += model.slider_remainder * largest.sum(axis=1)
-    variation = stiffest * (found.load_variation @ model.following_drift)
-    variation += model.slider_remainder * (largest @ np.arange(found.terms))
-    return level, variation
-
-
-def _elastic_violations(found: Interpolant, force: Array, level: Array) -> Ints:
-    """Return the elements on which the slider of an elastic storey may pass its yield force.
-
-    Args:
-        found: The motions.
-        force: The slider's force while elastic, shape (e, K, F), in N.
-        level: Bounds of what it misses, shape (e,), in N.
-    """
-    model = found.model
-    at = np.flatnonzero(found.phase == 0)
-    # Mostly the sum of all magnitudes shows that the force is small enough.
-    matrix = bernstein_matrix(found.terms - 1)
-    control = np.einsum("ik,ekf->eif", matrix, force[at])
-    middle, radius = ranges(model, control)
-    most = np.abs(middle) + radius
-    return np.asarray(at[most.max(axis=1, initial=0.0) + level[at] > model.force_ends[0]])
-
-
-def ranges(model: BoxModel, values: Array) -> tuple[Array, Array]:
-    """Return midpoints and radii of intervals of polynomials over the box, shape (…) each."""
-    found = coefficients(values, model.inputs, model.fine)
-    return found[..., 0], np.abs(found[..., 1:]).sum(axis=-1)
+    falls: Array  # what the force falls beyond the yield force, on each part of the box, (parts,)
+    rises: Array  # what it rises there, (parts,)
+    most: Array  # by how much it is beyond, (parts,)
+    integral: Array  # of that over τ, (parts,)
 
 
 def _elastic_violation(
     model: BoxModel, force: Array, level: float, variation: float, small: float
-) -> tuple[Array, Array, Array, float]:
+) -> _Violation:
     """Bound what is left out where the slider of an elastic storey passes its yield force.
 
     The slider of the motion is held there. While the force rises beyond, it flows as it may; it is
@@ -545,64 +474,46 @@ def _elastic_violation(
         level: Bound of what it misses, in N.
         variation: Bound of the derivative by τ of what it misses, in N.
         small: See `defects`.
-
-    Returns:
-        On each part of the box: bounds of what the force falls beyond the yield force, in N; of by
-        how much it is beyond; and of the integral of that over τ. And how far it rises beyond
-        anywhere in the box, in N.
     """
     best = _elastic_violation_on(model, force, level, variation, TIME_PARTS[0])
-    enough = max(SMALL_VIOLATION * model.force_ends[0], small * np.sqrt(model.slider_ends[0]))
+    enough = max(SMALL_VIOLATION * model.low.force, small * np.sqrt(model.low.slider))
     for pieces in TIME_PARTS[1:]:
         # Control points on shorter parts of the time lie closer to the force.
-        if not best[0].max() > enough:
-            break
-        closer = _elastic_violation_on(model, force, level, variation, pieces)
-        gain = best[0].max() / max(closer[0].max(), 1e-300)
-        best = closer
-        if gain < 2:
-            break
+        before = best.falls.max()
+        if before > enough:
+            best = _elastic_violation_on(model, force, level, variation, pieces)
+            if before < 2 * best.falls.max():
+                break
     return best
 
 
 def _elastic_violation_on(
     model: BoxModel, force: Array, level: float, variation: float, pieces: int
-) -> tuple[Array, Array, Array, float]:
+) -> _Violation:
     """Return the results of `_elastic_violation` by control points on equal parts of the time."""
     control = bernstein_matrix(len(force) - 1, pieces) @ force
     parts = model.parts**model.inputs
-    moved, most, integral = np.zeros((3, parts))
-    rise = 0.0
-    degree = model.of_slider
+    found = _Violation(*np.zeros((4, parts)))
     for side in (-1.0, 1.0):
-        excess = side * control - model.force
-        middle, radius = ranges(model, excess)
-        may_pass = middle + radius + level > 0
-        if not may_pass.any():
-            continue
+        excess = side * control - model.grid.force
+        middle, radius = model.ranges(excess)
         # Control points that are surely below count as zero, and bound falls and rises of those
         # beside them. The last one of a part of the time is the first one of the next.
-        near = np.flatnonzero(may_pass)
+        near = np.flatnonzero(middle + radius + level > 0)
+        if not len(near):
+            continue
         above = np.zeros((len(excess), parts))
-        above[near] = np.maximum(model.part_maxima(excess[near], degree) + level, 0.0)
-        falls = above[near]
-        inner = near < len(excess) - 1
-        change = excess[near[inner]] - excess[near[inner] + 1]
-        falls[inner] = np.minimum(falls[inner], np.maximum(model.part_maxima(change, degree), 0.0))
-        falls[~inner] = 0.0
-        rises = above[near]
-        inner = near > 0
-        change = excess[near[inner]] - excess[near[inner] - 1]
-        rises[inner] = np.minimum(rises[inner], np.maximum(model.part_maxima(change, degree), 0.0))
-        rises[~inner] = 0.0
+        above[near] = np.maximum(model.part_maxima(excess[near], model.of_slider) + level, 0.0)
         # What the force misses rises and falls on those parts of the time alone.
         is_beyond = above.reshape(pieces, -1, parts).max(axis=1) > 0
-        varied = variation * is_beyond.mean(axis=0)
-        moved += falls.sum(axis=0) + varied
-        rise += float((rises.sum(axis=0) + varied).max())
-        most = np.maximum(most, above.max(axis=0))
-        integral += above.mean(axis=0)
-    return moved, most, integral, rise
+        for total, step in ((found.falls, 1), (found.rises, -1)):
+            beside = np.clip(near + step, 0, len(excess) - 1)
+            change = model.part_maxima(excess[near] - excess[beside], model.of_slider)
+            total += np.minimum(above[near], np.maximum(change, 0.0)).sum(axis=0)
+            total += variation * is_beyond.mean(axis=0)
+        np.maximum(found.most, above.max(axis=0), out=found.most)
+        np.add(found.integral, above.mean(axis=0), out=found.integral)
+    return found
 
 
 def _reversals(found: Interpolant) -> list[tuple[int, Array]]:
@@ -618,10 +529,8 @@ def _reversals(found: Interpolant) -> list[tuple[int, Array]]:
     order = np.arange(1, found.terms)[:, np.newaxis]
     # h times the velocity of the drift against the direction, at control points
     backward = -found.phase[at, np.newaxis, np.newaxis] * order * found.drift[at, 1:]
-    middle, radius = ranges(
-        model, np.einsum("ik,ekf->eif", bernstein_matrix(len(order) - 1), backward)
-    )
-    variation = found.load_variation[at] @ model.following_drift
+    middle, radius = model.ranges(bernstein_matrix(len(order) - 1) @ backward)
+    variation = found.load_variation[at] @ model.following_drifts[:, model.place]
     control_matrix = bernstein_matrix(len(order) - 1, REVERSAL_PARTS)
     results: list[tuple[int, Array]] = []
     for number in np.flatnonzero((middle + radius).max(axis=1) + variation > 0):

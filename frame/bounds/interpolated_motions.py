@@ -7,7 +7,7 @@ is wrong has large defects.
 The unknowns are X = q − Σ w_l g_l and P = M X' + C q with the displacements q relative to the
 ground. Each load f_l(t) accelerates the floors by w_l f_l, and g_l is its integral twice over time:
 
-    X' = M⁻¹ (P − C q),    P' = −K_p q − b r,    q = X + Σ w_l g_l.
+    X' = M⁻¹ P − D q,    P' = −K_p q − b r,    q = X + Σ w_l g_l,    D = M⁻¹ C.
 
 Here r is the force of the slider of the storey with the drift bᵀ q. It is K_z bᵀ q − c while the
 storey is elastic, with a constant c, and ± its yield force while it yields. So the loads enter by
@@ -27,6 +27,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.kernels import compiled
+from alphacut.frame.calculus.interpolation import bernstein_matrix
 
 # Largest number of terms of a Taylor series over an element, and the fraction of the largest term
 # at which it ends. What is left out is a part of the defects.
@@ -35,21 +36,10 @@ LAST_TERM = 1e-15
 # Number of terms of a load's polynomial over an element (tuned: a degree of 7 misses some 1e-8 of a
 # ground's displacement where an event may come at several samples).
 LOAD_TERMS = 8
-# Points at which the load is interpolated, and the matrix from values to powers; the matrix from
-# values at the points (1 + s) / 2 to Bernstein coefficients on [0, 1].
+# Points at which the load is interpolated, and the matrix from values to powers.
 FIT_POINTS = np.cos(np.pi * (np.arange(LOAD_TERMS) + 0.5) / LOAD_TERMS)
 FIT = np.linalg.inv(np.vander(FIT_POINTS, LOAD_TERMS, increasing=True))
-BERNSTEIN = np.linalg.inv(
-    np.array(
-        [
-            [
-                math.comb(LOAD_TERMS - 1, i) * s**i * (1 - s) ** (LOAD_TERMS - 1 - i)
-                for i in range(LOAD_TERMS)
-            ]
-            for s in (1 + FIT_POINTS) / 2
-        ]
-    )
-)
+BERNSTEIN = bernstein_matrix(LOAD_TERMS - 1)
 # Spread of the time of an event, as a fraction of its duration, above which it is left out, and
 # fraction of the room at its time that it may take then (tuned).
 SHORT_EVENT = 0.3
@@ -59,17 +49,20 @@ SHORT_ROOM = 0.2
 COST = 1.2
 # Time of an event that does not come, in s.
 NEVER = 1e30
-# How a march ends.
-DONE, NO_COMMON_ORDER, TOO_MANY = range(3)
+# Number of elements of a march that fails.
+NONE = -1
 
 
 class Frames(NamedTuple):
-    """A frame of N floors at J parameter sets under L loads."""
+    """A frame of N floors at J parameter sets under L loads.
 
-    inverse_mass: Array  # (J, N), in 1/kg
-    damping: Array  # C, (J, N, N), in N s/m
-    elastic: Array  # K_p + K_z b bᵀ, (J, N, N), in N/m
-    yielded: Array  # K_p, (J, N, N), in N/m
+    A storey has the stiffness κ after yielding, less weight over height, and the yielding one a
+    slider beside it.
+    """
+
+    inverse_mass: Array  # (N, J), in 1/kg
+    decay: Array  # D = M⁻¹ C, (N, N, J), in 1/s
+    stiffness: Array  # κ, (N, J), in N/m
     slider: Array  # K_z, (J,), in N/m
     force: Array  # yield force of the slider, (J,), in N
     place: int  # number of the yielding storey, from 0
@@ -84,16 +77,15 @@ class LoadIntegrals(NamedTuple):
 
 
 class Elements(NamedTuple):
-    """Motions at J parameter sets on at most E elements, with A the fraction τ that has passed."""
+    """Motions at J parameter sets on at most E elements, with the fraction τ that has passed."""
 
     begin: Array  # (E, J), in s
     length: Array  # (E, J), in s
     phase: Ints  # direction of yielding, or 0, (E,)
-    constant: Array  # c of an elastic storey, in N, (E, J)
+    constant: Array  # c of an elastic storey, or of the one behind it, in N, (E, J)
     path: Array  # plastic path of an elastic storey; of a yielding one less phase · drift, (E, J)
     series: Array  # powers of τ of X and P, (E, MAX_TERMS, 2N, J)
-    load: Array  # powers of τ of the polynomials of g, (E, LOAD_TERMS, L, J)
-    fit: Array  # powers of (t − midpoint) / radius of these, (E, L, LOAD_TERMS)
+    fit: Array  # polynomials of g, powers of (t − midpoint) / radius, (E, L, LOAD_TERMS)
     span: Array  # midpoint and radius of the times of an element, in s, (E, 2)
     fit_error: Array  # bounds of |g − its polynomial|, and of the derivative by time, (E, L, 2)
     event: Ints  # side of the event at the end of the element, 0 without one, (E,)
@@ -101,30 +93,58 @@ class Elements(NamedTuple):
 
 
 @compiled
-def _drift(x: Array, place: int) -> float:
-    """Return the drift of a storey of displacements (N,)."""
-    if place == 0:
-        return float(x[0])
-    return float(x[place] - x[place - 1])
+def composed(fit: Array, at_zero: Array, slope: Array, out: Array) -> None:
+    """Write polynomials of s by powers of τ for s = at_zero + τ slope to `out`.
+
+    Args:
+        fit: Powers of s, shape (L, terms).
+        at_zero: Shape (J,).
+        slope: Shape (J,).
+        out: Receives the powers of τ, shape (terms, L, J).
+    """
+    out[:] = 0.0
+    loads, terms = fit.shape
+    for c in range(loads):
+        for k in range(terms - 1, -1, -1):  # Horner's rule
+            for m in range(terms - 1, 0, -1):
+                out[m, c] = out[m, c] * at_zero + out[m - 1, c] * slope
+            out[0, c] = out[0, c] * at_zero + fit[c, k]
 
 
 @compiled
 def _interval(loads: LoadIntegrals, t: float) -> int:
     """Return the interval of a time; that behind it where the time is an edge but for rounding."""
     i = int(np.searchsorted(loads.edges, t + 1e-11 * (1 + t), side="right")) - 1
-    return min(max(i, 0), len(loads.powers) - 1)
+    return min(i, len(loads.powers) - 1)
 
 
 @compiled
-def _shifted(loads: LoadIntegrals, interval: int, t: float, h: float, out: Array) -> None:
-    """Write the cubic of an interval by powers of (time − t) / h to `out`, shape (4 or more, L)."""
+def _cubic(loads: LoadIntegrals, interval: int, t: float, h: float) -> Array:
+    """Return the cubics of an interval by powers of (time − t) / h, shape (4, L)."""
     s = t - loads.edges[interval]
-    for load in range(loads.powers.shape[1]):
+    out = np.empty((4, loads.powers.shape[1]))
+    for load in range(out.shape[1]):
         a, b, c, d = loads.powers[interval, load]
         out[0, load] = a + s * (b + s * (c + s * d))
         out[1, load] = h * (b + s * (2 * c + s * 3 * d))
         out[2, load] = h**2 * (c + s * 3 * d)
         out[3, load] = h**3 * d
+    return out
+
+
+@compiled
+def _drifts(frames: Frames, series: Array, load: Array) -> Array:
+    """Return the powers of τ of the drift bᵀ q of the yielding storey, shape (terms,)."""
+    place = frames.place
+    found = series[:, place].copy()
+    follow = frames.follow[:, place].copy()
+    if place > 0:
+        found -= series[:, place - 1]
+        follow -= frames.follow[:, place - 1]
+    for k in range(len(load)):
+        for c in range(len(follow)):
+            found[k] += follow[c] * load[k, c]
+    return found
 
 
 @compiled
@@ -145,16 +165,10 @@ def _expand(
         series: Receives the powers of τ, shape (MAX_TERMS, 2N); the rest is set to zero.
     """
     n = len(start) // 2
-    stiffness = frames.elastic[j] if phase == 0 else frames.yielded[j]
-    damping = frames.damping[j]
-    slider = -constant if phase == 0 else phase * frames.force[j]
-    place = frames.place
     q = np.empty(n)
     series[:] = 0.0
     series[0] = start
     largest_x = largest_p = 0.0
-    terms = MAX_TERMS
-    small = 0
     for k in range(MAX_TERMS - 1):
         x_size = p_size = 0.0
         for i in range(n):
@@ -167,56 +181,33 @@ def _expand(
         largest_x = max(largest_x, x_size)
         largest_p = max(largest_p, p_size)
         if k >= LOAD_TERMS and x_size <= LAST_TERM * largest_x and p_size <= LAST_TERM * largest_p:
-            small += 1
-            if small == 2:
-                terms = k + 1
-                break
-        else:
-            small = 0
+            return k + 1
+        factor = h / (k + 1)
         for i in range(n):
-            momentum = series[k, n + i]
-            force = 0.0
+            speed = frames.inverse_mass[i, j] * series[k, n + i]
             for m in range(n):
-                momentum -= damping[i, m] * q[m]
-                force -= stiffness[i, m] * q[m]
-            if k == 0 and i == place:
-                force -= slider
-            if k == 0 and i == place - 1:
-                force += slider
-            series[k + 1, i] = h * momentum * frames.inverse_mass[j, i] / (k + 1)
-            series[k + 1, n + i] = h * force / (k + 1)
-    return terms
+                speed -= frames.decay[i, m, j] * q[m]
+            series[k + 1, i] = factor * speed
+            drift = q[i] - q[i - 1] if i else q[i]
+            force = frames.stiffness[i, j] * drift
+            if i == frames.place:
+                if phase == 0:
+                    force += frames.slider[j] * drift
+                if k == 0:
+                    force += phase * frames.force[j] if phase else -constant
+            series[k + 1, n + i] -= factor * force
+            if i:
+                series[k + 1, n + i - 1] += factor * force
+    return MAX_TERMS
 
 
 @compiled
-def _drift_series(
-    frames: Frames, series: Array, load: Array, terms: int, out: Array
-) -> None:  # fmt: skip
-    """Write the powers of τ of the drift bᵀ q of the yielding storey to `out`."""
-    for k in range(terms):
-        out[k] = _drift(series[k], frames.place)
-        if k < len(load):
-            for c in range(load.shape[1]):
-                out[k] += _drift(frames.follow[c], frames.place) * load[k, c]
-
-
-@compiled
-def _excess(
-    frames: Frames, j: int, phase: int, constant: float, drift: Array, terms: int, tau: float,
-    h: float, side: int,
-) -> tuple[float, int]:  # fmt: skip
-    """Return by how much the state at τ passes the next event, in N or m/s, and its side."""
+def _excess(powers: Array, tau: float, side: int, limit: float) -> float:
+    """Return by how much a polynomial passes a limit at τ, on a side, or on any if this is 0."""
     value = 0.0
-    if phase != 0:
-        for k in range(terms - 1, 0, -1):
-            value = value * tau + k * drift[k]
-        return -phase * value / h, 0
-    for k in range(terms - 1, -1, -1):
-        value = value * tau + drift[k]
-    force = frames.slider[j] * value - constant
-    if side == 0:
-        side = 1 if force > 0 else -1
-    return side * force - frames.force[j], side
+    for k in range(len(powers) - 1, -1, -1):
+        value = value * tau + powers[k]
+    return (side * value if side else abs(value)) - limit
 
 
 @compiled
@@ -245,17 +236,23 @@ def _next_event(
         the search does, `NEVER` if it exceeds the room; and by how much the slider would be moved.
     """
     series = np.empty((MAX_TERMS, len(state)))
-    load = np.zeros((4, loads.powers.shape[1]))
-    drift = np.empty(MAX_TERMS)
+    place = frames.place
+    slider = frames.slider[j]
+    inverse_mass = frames.inverse_mass[place, j]
+    # The slider's force passes its yield force, or the velocity passes zero against its direction.
+    # What the slider's excess force pushes counts as the move that adds as much to S.
+    if phase == 0:
+        limit = frames.force[j]
+        per_excess = 1 / slider
+        of_drift = inverse_mass + (frames.inverse_mass[place - 1, j] if place else 0.0)
+        by_push = math.sqrt(of_drift / slider)
+    else:
+        limit = per_excess = 0.0
+        by_push = 1.0
     # Below this excess a motion has not passed an event (tuned: far above rounding).
     tolerance = 1e-11 * frames.force[j]
     if phase != 0:
-        tolerance /= math.sqrt(frames.slider[j] / frames.inverse_mass[j, frames.place])
-    # What the slider's excess force pushes counts as the move that adds as much to S.
-    of_drift = frames.inverse_mass[j, frames.place]
-    if frames.place > 0:
-        of_drift += frames.inverse_mass[j, frames.place - 1]
-    by_push = math.sqrt(of_drift / frames.slider[j])
+        tolerance /= math.sqrt(slider / inverse_mass)
     first = NEVER
     side = 0
     size = moved = pushed = 0.0
@@ -264,31 +261,27 @@ def _next_event(
     while t < until:
         i = _interval(loads, t)
         h = min(loads.edges[i + 1] - t, longest)
-        _shifted(loads, i, t, h, load)
+        load = _cubic(loads, i, t, h)
         terms = _expand(frames, j, phase, constant, load, h, y, series)
-        _drift_series(frames, series, load, terms, drift)
+        powers = _drifts(frames, series[:terms], load)
+        if phase == 0:
+            powers *= slider
+            powers[0] -= constant
+        else:
+            powers = -phase * np.arange(1, terms) * powers[1:] / h
+            side = 1
         before = 0.0
         for m in range(1, 5):
             tau = m / 4
-            value, its = _excess(frames, j, phase, constant, drift, terms, tau, h, side)
+            value = _excess(powers, tau, side, limit)
             if t + tau * h > after:
                 if (value > tolerance) != passes:
                     low = before
                     high = tau
                     for _ in range(50):
                         mid = (low + high) / 2
-                        value_there, _ = _excess(
-                            frames,
-                            j,
-                            phase,
-                            constant,
-                            drift,
-                            terms,
-                            mid,
-                            h,
-                            side if passes else its,
-                        )
-                        if (value_there > tolerance) != passes and t + mid * h > after:
+                        above = _excess(powers, mid, side, limit) > tolerance
+                        if above != passes and t + mid * h > after:
                             high = mid
                         else:
                             low = mid
@@ -296,21 +289,16 @@ def _next_event(
                         return first, side, t + high * h, size
                     passes = True
                     first = t + high * h
-                    side = its
+                    if side == 0:
+                        side = 1 if _excess(powers, high, 1, limit) > -limit else -1
                 if passes:
-                    if phase == 0:
-                        moved = max(moved, value / frames.slider[j])
-                        pushed += value * h / 4
-                        size = moved + by_push * pushed
-                    else:
-                        size += value * h / 4
+                    moved = max(moved, value * per_excess)
+                    pushed += value * h / 4
+                    size = moved + by_push * pushed
                     if COST * size + spent > room[i]:
                         return first, side, NEVER, size
             before = tau
-        for i in range(len(y)):
-            y[i] = 0.0
-            for k in range(terms):
-                y[i] += series[k, i]
+        y = series.sum(axis=0)
         t += h
     # What passes at the end of the search, and stays within the room, counts as ended there.
     return first, side, until if passes else NEVER, size
@@ -319,7 +307,7 @@ def _next_event(
 @compiled
 def _fit_load(
     loads: LoadIntegrals, low: float, high: float, fit: Array, span: Array, error: Array
-) -> None:  # fmt: skip
+) -> None:
     """Write polynomials of g over [low, high] to `fit` and `span`, and bounds of what they miss.
 
     Within one interval g is a cubic polynomial, which is taken as it is. Else it is interpolated.
@@ -334,68 +322,36 @@ def _fit_load(
         span: Receives midpoint and radius, shape (2,).
         error: Receives bounds of the difference and of its derivative by time, shape (L, 2).
     """
-    count = loads.powers.shape[1]
     mid = (low + high) / 2
     rad = max((high - low) / 2, 1e-300)
     span[0] = mid
     span[1] = rad
     error[:] = 0.0
     fit[:] = 0.0
-    cubic = np.zeros((4, count))
     first = _interval(loads, low)
-    last = first
-    while last + 1 < len(loads.powers) and loads.edges[last + 1] < high - 1e-11 * (1 + high):
-        last += 1
+    last = max(first, _interval(loads, high - 2e-11 * (1 + high)))
     if first == last:
-        _shifted(loads, first, mid, rad, cubic)
-        for c in range(count):
-            for k in range(4):
-                fit[c, k] = cubic[k, c]
+        fit[:, :4] = _cubic(loads, first, mid, rad).T
         return
-    values = np.zeros((LOAD_TERMS, count))
     for p in range(LOAD_TERMS):
         t = mid + rad * FIT_POINTS[p]
-        _shifted(loads, _interval(loads, t), t, 1.0, cubic)
-        values[p] = cubic[0]
-    for c in range(count):
-        for k in range(LOAD_TERMS):
-            for p in range(LOAD_TERMS):
-                fit[c, k] += FIT[k, p] * values[p, c]
-    bernstein = np.empty(LOAD_TERMS)
+        values = _cubic(loads, _interval(loads, t), t, 1.0)[0]
+        for c in range(len(fit)):
+            fit[c] += FIT[:, p] * values[c]
+    local = np.empty((LOAD_TERMS, len(fit), 1))
     for piece in range(first, last + 1):
         begin = max(loads.edges[piece], low)
         width = min(loads.edges[piece + 1], high) - begin
         if width <= 0:
             continue
-        for c in range(count):
-            for p in range(LOAD_TERMS):
-                t = begin + width * (1 + FIT_POINTS[p]) / 2
-                _shifted(loads, piece, t, 1.0, cubic)
-                value = 0.0
-                for k in range(LOAD_TERMS - 1, -1, -1):
-                    value = value * (t - mid) / rad + fit[c, k]
-                values[p, c] = cubic[0, c] - value
-            for k in range(LOAD_TERMS):
-                bernstein[k] = 0.0
-                for p in range(LOAD_TERMS):
-                    bernstein[k] += BERNSTEIN[k, p] * values[p, c]
-                error[c, 0] = max(error[c, 0], abs(bernstein[k]))
-                if k > 0:
-                    slope = (LOAD_TERMS - 1) * abs(bernstein[k] - bernstein[k - 1]) / width
-                    error[c, 1] = max(error[c, 1], slope)
-
-
-@compiled
-def _composed(fit: Array, span: Array, begin: float, h: float, out: Array) -> None:
-    """Write a load's polynomials by powers of τ, t = begin + τ h, to `out`, (LOAD_TERMS, L)."""
-    at_zero = (begin - span[0]) / span[1]
-    slope = h / span[1]
-    out[:] = 0.0
-    for c in range(len(fit)):
-        for k in range(LOAD_TERMS - 1, -1, -1):
-            for m in range(LOAD_TERMS - 1, 0, -1):
-                out[m, c] = out[m, c] * at_zero + out[m - 1, c] * slope
-            out[0, c] = out[0, c] * at_zero + fit[c, k]
+        missed = fit.copy()
+        missed[:, :4] -= _cubic(loads, piece, mid, rad).T
+        composed(missed, np.array([(begin - mid) / rad]), np.array([width / rad]), local)
+        for c in range(len(fit)):
+            control = BERNSTEIN @ local[:, c, 0].copy()
+            slope = (LOAD_TERMS - 1) * np.abs(np.diff(control)).max() / width
+            error[c, 0] = max(error[c, 0], np.abs(control).max())
+            error[c, 1] = max(error[c, 1], slope)
 
 
 @compiled
@@ -423,8 +379,8 @@ def _mark_behind(loads: LoadIntegrals, t: float) -> int:
 def march(
     frames: Frames, loads: LoadIntegrals, start: Array, last: int, longest: float, window: float,
     room: Array, small: float, stride: int, spectral: Array, out: Elements,
-) -> tuple[int, int]:  # fmt: skip
-    """Write the motions of J frames with one order of events, and return how this ends.
+) -> int:  # fmt: skip
+    """Write the motions of J frames with one order of events, and return the number of elements.
 
     An event that some of the motions do not have, or only at another time, is left out by all of
     them if it moves the slider by no more than the room at that time.
@@ -443,15 +399,16 @@ def march(
         out: Receives the elements.
 
     Returns:
-        The status (`DONE`, `NO_COMMON_ORDER` or `TOO_MANY` elements) and the number of elements.
+        The number of elements; `NONE` without a common order of events, or of too many elements.
     """
-    n_sets, n = frames.inverse_mass.shape
+    n, n_sets = frames.inverse_mass.shape
     until = loads.edges[-2]
     search_until = min(until, loads.edges[last] + window)
     state = start.copy()
     t, event_time, end_time, size, constant, path, new = np.zeros((7, n_sets))
     side = np.zeros(n_sets, np.int64)
     series = np.empty((MAX_TERMS, 2 * n))
+    loads_at = np.empty((LOAD_TERMS, len(frames.follow), n_sets))
     phase = edge = element = 0
     spent = 0.0
     is_fixed = True
@@ -473,87 +430,65 @@ def march(
             # What begins when the first event has ended is another event.
             chosen = event_time < min(event_time[f] + window, end_time[f])
             chosen &= side == side[f]
-            can_skip = True
-            most = 0.0
-            latest = event_time[f]
-            shortest = NEVER
-            for j in range(n_sets):
-                if chosen[j]:
-                    can_skip = can_skip and end_time[j] < NEVER
-                    most = max(most, size[j])
-                    latest = max(latest, event_time[j])
-                    shortest = min(shortest, end_time[j] - event_time[j])
+            can_skip = end_time[chosen].max() < NEVER
+            most = size[chosen].max()
+            shortest = (end_time - event_time)[chosen].min()
             # An event of all motions that hardly moves the slider costs less if it is left out, and
             # so does one whose time spreads over more than it lasts: it is no smooth function of
             # the inputs.
             allowed = small
-            if latest - event_time[f] > SHORT_EVENT * shortest:
+            if event_time[chosen].max() - event_time[f] > SHORT_EVENT * shortest:
                 allowed = max(allowed, SHORT_ROOM * (room[_interval(loads, event_time[f])] - spent))
             if chosen.all() and not (can_skip and most < allowed):
                 break
             if not can_skip:
-                return NO_COMMON_ORDER, element
+                return NONE
             spent += COST * most
         is_fresh = False
         # Between the parameter sets an event may come earlier, or later, than at all of them.
         mark = min(edge + stride, last) if is_fixed else _mark_behind(loads, _most(t, spectral))
         if mark >= len(loads.powers):
-            return TOO_MANY, element
+            return NONE
         spacing = loads.edges[mark] - loads.edges[mark - 1]
         is_event = -_most(-event_time, spectral) <= loads.edges[mark] + 0.5 * spacing
-        for j in range(n_sets):
-            new[j] = event_time[j] if is_event else loads.edges[mark]
-        if new.max() >= until:
-            return NO_COMMON_ORDER, element
+        new[:] = loads.edges[mark]
+        if is_event:
+            new[:] = event_time
         span = new - t
         begin = t.copy()
         parts = math.ceil(span.max() / longest - 1e-9)
-        if span.min() <= 0:
-            return NO_COMMON_ORDER, element
-        if element + parts >= len(out.phase):
-            return TOO_MANY, element
+        if new.max() >= until or span.min() <= 0 or element + parts >= len(out.phase):
+            return NONE
         for part in range(parts):
             out.begin[element] = begin + span * part / parts
             out.length[element] = span / parts
             out.phase[element] = phase
-            out.constant[element] = constant
-            if phase != 0:
-                out.constant[element] = 0.0
             out.path[element] = path
             out.event[element] = 0
             # Between the parameter sets the interpolated times may go beyond theirs.
             low = -_most(-out.begin[element], spectral)
             high = _most(out.begin[element] + out.length[element], spectral)
             _fit_load(loads, low, high, out.fit[element], out.span[element], out.fit_error[element])
-            terms = 0
+            at_zero = (out.begin[element] - out.span[element, 0]) / out.span[element, 1]
+            slope = out.length[element] / out.span[element, 1]
+            composed(out.fit[element], at_zero, slope, loads_at)
+            out.terms[element] = 0
+            is_end = is_event and part == parts - 1
             for j in range(n_sets):
-                load = np.empty((LOAD_TERMS, len(out.fit[element])))
-                _composed(
-                    out.fit[element], out.span[element], out.begin[element, j],
-                    out.length[element, j], load,
-                )  # fmt: skip
-                count = _expand(
-                    frames, j, phase, constant[j], load, out.length[element, j], state[j], series
-                )
-                terms = max(terms, count)
-                out.load[element, :, :, j] = load
+                load = loads_at[:, :, j]
+                h = out.length[element, j]
+                count = _expand(frames, j, phase, constant[j], load, h, state[j], series)
+                out.terms[element] = max(out.terms[element], count)
                 out.series[element, :, :, j] = series
-                for i in range(2 * n):
-                    state[j, i] = 0.0
-                    for k in range(MAX_TERMS):
-                        state[j, i] += series[k, i]
-                if is_event and part == parts - 1:
-                    end = 0.0
-                    for k in range(LOAD_TERMS):
-                        for c in range(load.shape[1]):
-                            end += _drift(frames.follow[c], frames.place) * load[k, c]
-                    end += _drift(state[j], frames.place)
+                state[j] = series.sum(axis=0)
+                if is_end:
+                    drift = _drifts(frames, series, load).sum()
                     if phase == 0:
-                        path[j] -= side[0] * end
+                        path[j] -= side[0] * drift
                     else:
-                        path[j] += phase * end
-                        constant[j] = frames.slider[j] * end - phase * frames.force[j]
-            out.terms[element] = terms
+                        path[j] += phase * drift
+                        constant[j] = frames.slider[j] * drift - phase * frames.force[j]
+            out.constant[element] = constant
             element += 1
         t[:] = new
         is_fixed = not is_event
@@ -564,4 +499,4 @@ def march(
         phase = int(side[0]) if phase == 0 else 0
         is_fresh = True
         end_time[:] = 0.0
-    return DONE, element
+    return element

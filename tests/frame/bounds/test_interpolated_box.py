@@ -89,25 +89,23 @@ def norms_and_bounds(frame, radius, inputs):
     )
     box = InterpolatedFrame(flow, np.arange(1))
     k = frame.parameters["k1"] * (1 + radius * inputs)
-    properties, model = box._model(*frame.parameters["k1"] * (1 + radius * np.array([[-1], [1]])))
-    marched = box._motions(properties, model, None)
-    if marched is None:  # the box is too wide for one order of events
+    model, _ = box._model(*frame.parameters["k1"] * (1 + radius * np.array([[-1], [1]])))
+    elements = box._motions(model, None)
+    if elements is None:  # the box is too wide for one order of events
         return np.zeros(1), np.zeros(1), 1.0
-    elements, count = marched
-    part = slice(0, count)
-    interpolant = interpolate(model, elements, part, with_rates=False)
+    interpolant = interpolate(model, elements, slice(None), with_rates=False)
     if interpolant is None:  # or for the times of its elements
         return np.zeros(1), np.zeros(1), 1.0
-    missed = defects(interpolant, elements.event[part])
+    missed = defects(interpolant)
     bounds = (missed.growth[:, np.newaxis] + missed.violation).cumsum(axis=0)
     coarse, fine = (chebvander(inputs, n) @ chebyshev_matrix(n) for n in (model.degree, model.fine))
     mass = np.array(frame.masses)
-    a, force = frame.hardening[0], model.force[0]
+    a, force = frame.hardening[0], model.grid.force[0]
     found = np.zeros((2, len(k), len(flow.time)))
     for s, exact in enumerate(flow.values(k[:, np.newaxis])):
         weights = coarse[s]
-        damping = model.damping @ fine[s]
-        begin, length = elements.begin[part] @ weights, elements.length[part] @ weights
+        damping = model.grid.damping @ fine[s]
+        begin, length = elements.begin @ weights, elements.length @ weights
         for node, t in enumerate(flow.time[1:-1], 1):
             e = np.searchsorted(begin, t, side="right") - 1
             powers = ((t - begin[e]) / length[e]) ** np.arange(elements.terms[e])
@@ -150,15 +148,14 @@ def test_what_kinematics_miss_is_below_its_bound(rng):
         frame = isolated_building(rng, 1, hardening=[hardening, 1.0], **undamped)
         box = InterpolatedFrame(YieldingFlow(frame, ("k1",), 2, 0.05), np.arange(1))
         ends = frame.parameters["k1"] * (1 + 0.02 * np.array([[-1], [1]]))
-        properties, model = box._model(*ends)
-        marched = box._motions(properties, model, None)
-        if marched is None:  # the box is too wide for one order of events
+        model, _ = box._model(*ends)
+        elements = box._motions(model, None)
+        if elements is None:  # the box is too wide for one order of events
             continue
-        elements, count = marched
-        found = interpolate(model, elements, slice(0, count), with_rates=False)
+        found = interpolate(model, elements, slice(None), with_rates=False)
         if found is None:  # or for the times of its elements
             continue
-        missed = defects(found, elements.event[:count]).drift
+        missed = defects(found).drift
         order = np.arange(1, found.terms)[:, np.newaxis]
         for y in chebvander(inputs, model.fine) @ chebyshev_matrix(model.fine):
             speed = powers[:, : found.terms - 1] @ (order * (found.displacement[:, 1:, 0] @ y).T)
@@ -184,66 +181,66 @@ def test_an_event_behind_the_end_of_only_some_motions_does_not_count(rng):
 
 
 def crisp_motion(rng):
-    """The motion of a frame without uncertain inputs: model, elements and which of these count."""
+    """The motion of a frame without uncertain inputs: model and elements."""
     frame = isolated_building(rng, 1)
     flow = YieldingFlow(frame, ("k1",), 1.5, 0.05)
     box = InterpolatedFrame(flow, np.arange(0))
     point = np.array([frame.parameters["k1"]])
-    properties, model = box._model(point, point)
-    elements, count = box._motions(properties, model, None)
-    return model, elements, slice(0, count)
+    model, _ = box._model(point, point)
+    return model, box._motions(model, None)
 
 
-def defects_of(model, elements, part):
-    interpolant = interpolate(model, elements, part, with_rates=False)
-    return interpolant, defects(interpolant, elements.event[part])
+def defects_of(model, elements):
+    interpolant = interpolate(model, elements, slice(None), with_rates=False)
+    return interpolant, defects(interpolant)
 
 
 def test_a_defect_that_is_put_into_a_motion_is_counted_in_full(rng):
-    model, elements, part = crisp_motion(rng)
-    slider, n = model.slider_ends[1], model.floors
-    drift = np.sqrt(model.stiffness_ends[1] + slider * np.array([1, 0]))
-    by_floor = np.append(np.hypot(drift, np.append(drift[1:], 0)), 1 / np.sqrt(model.mass_ends[1]))
-    e = int(rng.integers(part.stop))
+    model, elements = crisp_motion(rng)
+    slider, mass = model.high.slider, model.high.mass
+    drift = np.sqrt(model.grid.stiffness[:, 0] + slider * np.array([1, 0]))
+    by_floor = np.append(np.hypot(drift, np.append(drift[1:], 0)), 1 / np.sqrt(mass))
+    e = int(rng.integers(len(elements.phase)))
     for row, norm in enumerate(by_floor):  # velocities of X, then those of P
         series = elements.series.copy()
         series[e, 1, row] += 1e-3
-        _, missed = defects_of(model, elements._replace(series=series), part)
-        assert missed.growth[e] >= 0.999e-3 * norm, (row, n)
-    for e in np.flatnonzero((elements.event[part] != 0) & (elements.phase[part] == 0)):
+        _, missed = defects_of(model, elements._replace(series=series))
+        assert missed.growth[e] >= 0.999e-3 * norm, row
+    for e in np.flatnonzero((elements.event != 0) & (elements.phase == 0)):
         constant = elements.constant.copy()
         constant[e] += 1e-3
-        _, missed = defects_of(model, elements._replace(constant=constant), part)
+        _, missed = defects_of(model, elements._replace(constant=constant))
         assert missed.growth[e] >= 0.999e-3 / np.sqrt(slider)
 
 
 def test_what_a_slider_falls_back_from_beyond_its_yield_force_is_counted_in_full(rng):
-    model, elements, part = crisp_motion(rng)
-    force = 0.7 * model.force
-    model = replace(model, force=force, force_ends=np.repeat(force, 2))
-    interpolant, missed = defects_of(model, elements, part)
+    model, elements = crisp_motion(rng)
+    force = 0.7 * model.grid.force
+    grid = model.grid._replace(force=force)
+    model = replace(model, grid=grid, low=model.low._replace(force=force[0]))
+    interpolant, missed = defects_of(model, elements)
     times = np.linspace(0, 1, 2001)
-    for e in np.flatnonzero(elements.phase[part] == 0):
-        values = np.polynomial.polynomial.polyval(times, interpolant.slider_force[e, :, 0])
+    for e in np.flatnonzero(elements.phase == 0):
+        values = np.polynomial.polynomial.polyval(times, interpolant.elastic_force[e, :, 0])
         beyond = np.maximum(np.abs(values) - force[0], 0)
         fall = np.maximum(-np.diff(beyond), 0).sum()
-        assert missed.violation[e].max() >= 0.999 * fall / np.sqrt(model.slider_ends[1])
+        assert missed.violation[e].max() >= 0.999 * fall / np.sqrt(model.high.slider)
         assert missed.beyond[e].max() >= 0.999 * beyond.max()
 
 
 def test_what_passes_the_yield_force_between_samples_is_counted(rng):
     # The force rises and falls several times within an element, beyond a level that it keeps at
     # equally spaced times.
-    model, _, _ = crisp_motion(rng)
-    force = float(model.force[0])
+    model, _ = crisp_motion(rng)
+    force = float(model.grid.force[0])
     roots = np.linspace(0, 1, int(rng.integers(3, 7)))
     powers = np.polynomial.polynomial.polyfromroots(roots)
     times = np.linspace(0, 1, 2001)
     shape = np.polynomial.polynomial.polyval(times, powers)
     size = float(rng.uniform(1e-6, 0.5)) * force / np.abs(shape).max()
     powers = size * powers + force * (np.arange(len(powers)) == 0)
-    moved, most, _, _ = _elastic_violation(model, powers[:, np.newaxis], 0.0, 0.0, 0.0)
+    found = _elastic_violation(model, powers[:, np.newaxis], 0.0, 0.0, 0.0)
     beyond = np.maximum(size * shape, 0)
     fall = np.maximum(-np.diff(beyond), 0).sum()
-    assert fall * (1 - 1e-6) <= moved.max() <= 1.5 * fall
-    assert most.max() >= beyond.max() * (1 - 1e-6)
+    assert fall * (1 - 1e-6) <= found.falls.max() <= 1.5 * fall
+    assert found.most.max() >= beyond.max() * (1 - 1e-6)
