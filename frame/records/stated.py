@@ -28,6 +28,7 @@ _SPELLED = {
         "/s^2"
     ),
     r"\s+per\s+": "/",
+    r"\bper\s?cent\s+(?:of\s+)?(?:gravity|g)\b": "%g",
     r"\b(?:standard|fractions?\s+of|units?\s*[:=]?(?:\s*of)?)\s+gravity": "(g)",
     # The acceleration of gravity, as "g = 9.81 m/s2".
     r"(?:\bg\s*=\s*)?\b(?:9\.8\d*\s*\(?m|98[01]\.?\d*\s*\(?(?:cm|gal)|386\.\d*\s*in"
@@ -50,7 +51,7 @@ FACTOR = (
     r"(?:[x×*·]\s*|\b)10\s*(?:\^|\*\*|⁻|[²³⁴⁵⁶])|[x×*·]\s*10\s*[-−]\s*\d|\b1\.?0*e[-+]?\d"
     r"|[x×]\s*(?:1000*\b|0?\.0)"
     r"|\b(?:scal\w*[\s_]*factor|scal\w*(?=\s*[:=])|multipl\w*|divided|conversion)[\s:=]*(?:by\s+)?"
-    r"(?!1(?:\.0*)?\b)[\d.]|\b(?:of|in|is)\s+\d*\.?\d+\s*g\b"
+    r"(?!1(?:\.0*)?\b)[\d.]|[2²]\s*/\s*\d|\b(?:of|in|is)\s+\d*\.?\d+\s*g\b"
 )
 _INTERVAL = (
     r"(?:\b(?:sampl\w*|time|data|digiti[sz]\w*)[\s_-]*(?:interval|step|period|spacing|increment)s?"
@@ -59,10 +60,13 @@ _INTERVAL = (
 _RATE = (
     r"(?:\b(?:sampl\w*|digiti[sz]\w*|acquisition|data)[\s_-]*(?:rate|freq\w*)|(?<![a-z])fs\b"
     r"|\bsamples?/s(?:ec(?:ond)?)?|\bsps"
-    r"|(?:\bsampl\w*|\brate|\bdigiti[sz]\w*|@)"
+    r"|^\W*rate(?=\s*[:=])|(?:\bsampl\w*|\brate|\bdigiti[sz]\w*|@)"
     r"(?=(?:(?!filt|pass|corner|cut|band)[^\d\n]){0,20}[\d.]+\s*k?hz))"
 )
-_BEHIND = r"[\s_]*(?:[\[(](?P<before>[^\])]*)[\])])?[\s:=@\"']*(?:(?:is|was|of|at|with|by)\s+)?"
+_BEHIND = (
+    r"[\s_]*(?:between\s+\w+\s*)?(?:[\[(](?P<before>[^\])]*)[\])])?[\s:=@\"']*"
+    r"(?:(?:is|was|of|at|with|by)\s+)?"
+)
 
 
 @dataclass
@@ -195,10 +199,11 @@ def _steps(text: str, place: str) -> Iterator[Stated]:
         if seconds_of(unit):
             yield _step(number, seconds_of(unit), f"{number} {unit}", place)
     rate = rf"{_RATE}{_BEHIND}{_NUMBER}\s*(?P<unit>kHz)?"
-    rate += r"|(?P<number2>\d+\.?\d*)\s*(?:sps|(?:samples?|points?)/s)"
+    rate += r"|(?P<number2>\d+\.?\d*)\s*"
+    rate += r"(?:sps|(?:samples?|points?)/s|(?:hz|(?P<kilo>khz))\s+(?:sampl|digiti))"
     for match in re.finditer(rate, text, re.IGNORECASE):
         number = match["number"] or match["number2"]
-        is_kilo = "khz" in (match["unit"] or match["before"] or "").lower()
+        is_kilo = "khz" in (match["unit"] or match["before"] or match["kilo"] or "").lower()
         hertz = float(number) * (1000 if is_kilo else 1)
         if hertz > 0:
             yield Stated(1 / hertz, f"{1 / hertz:.6g} s, of {hertz:g} Hz", place)

@@ -216,6 +216,11 @@ HEADS = [
     ("*** accelerations in g's, delta t = 1/100 sec ***\n", COLUMN, 0.01, G),
     ("t/ms a/(cm/s²)\n", (" ", 1000), 0.01, 0.01),
     ("Time [s],Acceleration [g],\n", (",", 1), 0.01, G),
+    ("acceleration (cm/s/s); 200 Hz sampling\n", COLUMN, 0.005, 0.01),
+    ("acceleration in percent of gravity, interval .01\n", COLUMN, 0.01, G / 100),
+    ("Time step = 0.01 (s), in units of m/s2 / 10\n", COLUMN, 0.01, None),
+    ("time interval between points 0.005 sec; in cm per sec per sec\n", COLUMN, 0.005, 0.01),
+    ("Rate: 100\nUnits: gal\n", COLUMN, 0.01, 0.01),
 ]
 """Heads with the layout of the numbers, their step in s, and their unit in m/s²; None of others."""
 
