@@ -44,7 +44,7 @@ HERTZ = {
     "hz": 1.0, "khz": 1e3, "hertz": 1.0, "cps": 1.0, "cycles/s": 1.0, "cycles/sec": 1.0,
     "cycle/s": 1.0, "cycles per second": 1.0, "rad/s": 0.0, "rad/sec": 0.0, "rpm": 0.0,
     "1/min": 0.0, "radians per second": 0.0, "radians/second": 0.0, "rad s-1": 0.0, "rad*hz": 0.0,
-    "cpm": 0.0, "1/s": 0.0, "s^-1": 0.0,
+    "cpm": 0.0, "1/s": 0.0, "s^-1": 0.0, "kilohertz": 1e3, "millihertz": 1e-3,
 }  # fmt: skip
 
 
@@ -92,7 +92,9 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
         words = (
             r"(?i)\b(?:periods?|omega\w*|angular|circular|pulsation|eigenvalues?|lambda|2\s*pi)\b"
         )
-        words += rf"|ω|2\s*π|^T\b|{FACTOR}|\bscaled\s+by\b|\bin\s+[\d.]+\s*k?hz"
+        words += rf"|ω|2\s*π|^T\b|{FACTOR}|\bscaled\s+by\b|\bper\s+minute|/\s*min\b"
+        words += r"|\bsquared|hz(?:\^|²)|\bin\s+[\d.]+\s*k?hz"
+        words += r"|(?:frequenc\w+|values)\s+(?:are\s+)?normali"
         if {"frequency_std", "shape_std"} & columns.keys():
             words += r"|(?:std|deviation|scatter|error|uncertaint)\w*\b.*(?:%|\bper\s?cent)"
         other = next((x for x in [*header, *comments] if re.search(words, x.strip())), "")

@@ -49,7 +49,7 @@ _G = (
 _OTHER_UNIT = r"\bunits?\b\s*(?:(?:of|are|is|in)\b)?[\s:=]*[\[(]?([^\s,;\])]+)"
 FACTOR = (
     r"(?:[x×*·]\s*|\b)10\s*(?:\^|\*\*|⁻|[²³⁴⁵⁶])|[x×*·]\s*10\s*[-−]\s*\d|\b1\.?0*e[-+]?\d"
-    r"|[x×]\s*(?:1000*\b|0?\.0)"
+    r"|[x×]\s*(?:1000*\b|0?\.\d)"
     r"|\b(?:scal\w*[\s_]*factor|scal\w*(?=\s*[:=])|multipl\w*|divided|conversion)[\s:=]*(?:by\s+)?"
     r"(?!1(?:\.0*)?\b)[\d.]|[2²]\s*/\s*\d|\b(?:of|in|is)\s+\d*\.?\d+\s*g\b"
 )

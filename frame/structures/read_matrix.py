@@ -42,6 +42,25 @@ ALLOWED = "a file .mtx, .sti, .mas, .pch, .op4, .full, .npz, .npy or .csv of fin
 MAX_ROWS = 5000
 # Abaqus writes 1e36 or more on the diagonal of an unknown that it holds. No spring comes near it.
 HELD_STIFFNESS = 1e35
+_FORCE = r"(?:(?:da|[kMG])?N|lbf?|kips?|kgf|tonf?|dyn)"
+_LENGTH = r"(?:mm|cm|m|in|ft|inch|inches)"
+# A force over a length, as of stiffnesses and dampings, or times a length.
+_QUOTIENT = (
+    rf"(?<![\w./]){_FORCE}\s*(?:\(?[-*·. ]?\s*s(?:\^|\*\*)?[2²]?\)?\s*)?/\s*{_LENGTH}\b"
+    rf"|(?<![\w./]){_FORCE}[-*·. ]{{0,3}}(?:mm|cm|m|ft)\b"
+)
+# Words that are units, or tell that there are none, wherever they stand but behind a number.
+_SURE = (
+    r"(?<![\w./])(?<!\d )(?:tonnes?|tons?|[kMG]Pa|ksi|psi|kips?|inch|inches|pounds?|slugs?|daN"
+    r"|[kMG]N(?!\s*/)|flexibility|normali[sz]ed|dimensionless)\b"
+)
+_BEHIND_IN = rf"\bin\s+({_FORCE}|mm|cm|m|ft|t|tons?|Mg|kg|g)(?![\w./])"
+# Units where a line has the word unit, brackets, or "in" and a number.
+_WORD = rf"(?<![\w./])(?:{_FORCE}|{_LENGTH}|t|tons?|Mg|kg|g|slugs?)(?![\w.])"
+_SPELLED = {
+    "kilo-?newtons?": "kN", "mega-?newtons?": "MN", r"\bnewtons?": "N", r"\s+per\s+": "/",
+    r"milli-?met(?:er|re)s?": "mm", r"\bmet(?:er|re)s?": "m", r"\bmetric tons?": "tonnes",
+}  # fmt: skip
 
 
 def read_matrix(
@@ -120,18 +139,6 @@ def _stated_factor(path: Path) -> float:
     if path.suffix.lower() not in (".mtx", ".csv", ".pch", ".bdf", ".nas", ".sti", ".mas"):
         return 1.0
     stated = []
-    force = r"(?:(?:da|[kMG])?N|lbf?|kips?|kgf|tonf?|dyn)"
-    length = r"(?:mm|cm|m|in|ft|inch|inches)"
-    quotient = rf"(?<![\w./]){force}\s*(?:\(?[-*·. ]?\s*s(?:\^|\*\*)?[2²]?\)?\s*)?/\s*{length}\b"
-    quotient += rf"|(?<![\w./]){force}[-*·. ]{{0,3}}(?:mm|cm|m|ft)\b"
-    sure = (
-        r"tonnes?|[kMG]Pa|ksi|psi|kips?|inch|inches|pounds?|slugs?|daN|[kMG]N(?!\s*/)|flexibility"
-    )
-    sure = rf"(?<![\w./])(?<!\d )(?:{sure})\b"
-    behind_in = rf"\bin\s+({force}|mm|cm|m|ft|t|tons?|kg|g)(?![\w./])"
-    word = rf"(?<![\w./])(?:{force}|{length}|t|tons?|Mg|kg|g|slugs?)(?![\w.])"
-    spelled = {"kilo-?newtons?": "kN", "mega-?newtons?": "MN", r"\bnewtons?": "N"}
-    spelled |= {r"milli-?met(?:er|re)s?": "mm", r"\bmet(?:er|re)s?": "m", r"\s+per\s+": "/"}
     factors = {"k": 1e3, "M": 1e6, "G": 1e9, "N": 1.0, "t": 1e3}
     cure = "write the matrix in N, m, kg, or say override = ['unit'] if the comment is wrong"
     content = path.read_bytes()
@@ -139,13 +146,14 @@ def _stated_factor(path: Path) -> float:
         line = comment[0].decode("utf-8", "replace")
         row = content.count(b"\n", 0, comment.start()) + 1
         place = f"{path.name}, line {row}"
-        for pattern, symbol in spelled.items():
+        for pattern, symbol in _SPELLED.items():
             line = re.sub(pattern, symbol, line, flags=re.IGNORECASE)
-        units = [*re.findall(quotient, line), *re.findall(sure, line)]
-        units += re.findall(behind_in, line)
-        if re.search(r"(?i)\bunits?\b|[\[(]", line):
-            units += re.findall(word, line)
+        units = [*re.findall(_QUOTIENT, line), *re.findall(_SURE, line)]
+        units += re.findall(_BEHIND_IN, line)
+        if re.search(r"(?i)\bunits?\b|[\[(]|\bin\s+\d", line):
+            units += re.findall(_WORD, line)
         has_factor = re.search(FACTOR, line, re.IGNORECASE) is not None
+        has_factor = has_factor or re.search(r"\bin\s+\d[\d.]*\s*[a-zA-Z]", line) is not None
         is_of_numbers = bool(units) or re.search("(?i)scal|multipl|divi", line) is not None
         require(
             not (has_factor and is_of_numbers),

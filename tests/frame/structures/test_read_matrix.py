@@ -241,6 +241,9 @@ def test_an_archive_that_unpacks_to_more_than_memory_is_refused(tmp_path, monkey
         ("displacements in mm, forces in N", None),
         ("daN/m", None),
         ("flexibility, m/kN", None),
+        ("mass in 1000 kg", None),
+        ("mass in Mg", 1e3),
+        ("masses, metric tons", 1e3),
     ],
 )
 @pytest.mark.parametrize("name", ["k.csv", "k.mtx", "job.mtx"])
