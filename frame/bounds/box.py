@@ -23,6 +23,7 @@ from alphacut.frame.modes.structure import (
     ClassicalStructure,
     CoupledModesError,
     classical_structure,
+    parameter_models,
 )
 from alphacut.frame.response.oscillators import Source
 from alphacut.frame.result import within_steps
@@ -234,16 +235,12 @@ def parameters_over_box(
 ) -> dict[str, TaylorModel]:
     """Return all parameters of a structure by name, as scalar Taylor models as of `over_box`."""
     midpoint = (low + high) / 2
-    radius = (high - low) / 2
     active = np.flatnonzero(high > low)
-    variables = TaylorModel.variables(midpoint[active], radius[active])
-    values = dict(system.parameters)
-    for name, value in zip(names, midpoint, strict=True):
-        values[name] = float(value)
-    parameters = {name: TaylorModel.constant(x, len(active)) for name, x in values.items()}
-    for column, i in enumerate(active):
-        parameters[names[int(i)]] = variables[column]
-    return parameters
+    radius = ((high - low) / 2)[active]
+    fixed = dict(zip(names, midpoint, strict=True))
+    return parameter_models(
+        system, [names[i] for i in active], midpoint[active], radius, fixed=fixed
+    )
 
 
 def sources(system: LinearSystem, structure: ClassicalStructure) -> list[Source]:

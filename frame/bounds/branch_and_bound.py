@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.arrays import Array, Ints
 from alphacut.base.progress_bar import Progress
 from alphacut.frame.bounds.kernel import (
     FACES,
@@ -36,9 +36,6 @@ from alphacut.frame.bounds.remainders import remainder_bounds
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
 from alphacut.frame.modes.modal_model import ModalModel, wave_factors
 from alphacut.fuzzy.sets.boxes import chebyshev_points
-
-LOWER, UPPER = -1, -2
-"""Positions along an axis of a sub-box that is confined to an end of the whole box."""
 
 
 def bound_problems(
@@ -138,8 +135,8 @@ def _take_better_points(
         return
     higher = higher[np.argsort(value[higher])]  # of equal problems the last one, the best, stays
     problems = frontier.problem[higher]
-    midpoint = frontier.geometry().midpoint
-    optima.point[problems] = midpoint[frontier.box[higher]]
+    boxes = frontier.box[higher]
+    optima.point[problems] = (frontier.low[boxes] + frontier.high[boxes]) / 2
     optima.value[problems] = value[higher]
     refine(model, optima, np.unique(problems), frontier.lower, frontier.upper, min_gain)
 
@@ -174,10 +171,12 @@ def examine_items(
         faces (e_i = 0: input i stays free, 1: its lower end, 2: its upper end); `value` of side ×
         output at the midpoint; and its guaranteed upper `bound` over the sub-box.
     """
-    geometry = frontier.geometry(piece.boxes)
+    low = frontier.low[piece.boxes]
+    high = frontier.high[piece.boxes]
+    midpoint = (low + high) / 2
     n = model.count
     n_outputs = len(model.flow.outputs)
-    n_boxes, d = geometry.midpoint.shape
+    n_boxes, d = midpoint.shape
     box = frontier.box[piece.items] - piece.boxes.start
     node, column = np.divmod(frontier.problem[piece.items], 2 * n_outputs)
 
@@ -194,12 +193,12 @@ def examine_items(
     )
     # λ and C of all parts of the response at the midpoints, (q, B, n + parts n m): value, gradient
     # and packed second derivatives, q = 1 + d + d (d + 1)/2
-    jets = model.together.jets(geometry.midpoint).swapaxes(0, 1)
+    jets = model.together.jets(midpoint).swapaxes(0, 1)
     eigenvalues = jets[..., :n]
     coefficients = jets[..., n:].reshape(*jets.shape[:2], -1, n, n_outputs)
     boxes = BoxTables(
-        radius=geometry.radius,
-        is_outer=geometry.is_outer,
+        radius=(high - low) / 2,
+        is_outer=np.stack([low == frontier.lower, high == frontier.upper], axis=1),
         factors=wave_factors(eigenvalues, coefficients, d),
     )
     waves = model.waves(eigenvalues[0, row_box], row_node)
@@ -208,64 +207,25 @@ def examine_items(
     return found
 
 
-class Geometry(NamedTuple):
-    """Geometry of B sub-boxes."""
-
-    midpoint: Array  # (B, d)
-    radius: Array  # (B, d)
-    is_outer: Mask  # whether lower and upper faces lie on those of the whole box, (B, 2, d)
-
-
 @dataclass(frozen=True, eq=False)
 class Frontier:
-    """Open items: pairs of a sub-box and a problem, ordered by sub-box and then by problem.
-
-    Along each axis a sub-box is a dyadic interval of the whole box, 2^depth + index, or one of its
-    ends, `LOWER` or `UPPER`.
-    """
+    """Open items: pairs of a sub-box and a problem, ordered by sub-box and then by problem."""
 
     lower: Array  # lower ends of the whole box, (d,)
     upper: Array  # upper ends, (d,)
-    position: Ints  # intervals of the sub-boxes, (B, d)
+    low: Array  # lower ends of the sub-boxes, (B, d)
+    high: Array  # upper ends; those of an input that is confined to an end are equal, (B, d)
     box: Ints  # sub-box of each item, rising, (I,)
     problem: Ints  # number of its problem, rising for each sub-box, (I,)
 
     @classmethod
     def whole_box(cls, lower: Array, upper: Array, n_problems: int) -> Frontier:
         """Return the whole box for all problems."""
-        position = np.ones((1, len(lower)), np.int64)
         box = np.zeros(n_problems, np.int64)
-        return cls(lower, upper, position, box, np.arange(n_problems))
+        return cls(lower, upper, lower[np.newaxis], upper[np.newaxis], box, np.arange(n_problems))
 
     def __len__(self) -> int:
         return len(self.box)
-
-    def geometry(self, boxes: slice = slice(None)) -> Geometry:
-        """Return midpoints and radii of some sub-boxes, and which of their faces are outer ones.
-
-        Along each axis a sub-box has a `position`: a dyadic interval 2^depth + index, index 0 …
-        2^depth − 1 from the lower end on, of the whole box; or `LOWER` = −1 or `UPPER` = −2 where
-        it is confined to that end and has no width.
-
-        Args:
-            boxes: Slice of the sub-boxes; all unless given.
-
-        Returns:
-            `midpoint` and `radius`, shape (B, d) each, in the coordinates of the whole box;
-            `is_outer`, shape (B, 2, d), says whether the lower and the upper face lie on those of
-            the whole box. Along an axis without width both are True.
-        """
-        position = self.position[boxes]
-        interval = np.maximum(position, 1)  # ends of the whole box are treated as all of it first
-        width = 2.0 ** -np.floor(np.log2(interval + 0.5))  # fraction of the whole box: 2^−depth
-        begin = interval * width - 1
-        is_end = [position == LOWER, position == UPPER]
-        place = np.select(is_end, [0.0, 1.0], begin + width / 2)
-        return Geometry(
-            midpoint=self.lower + (self.upper - self.lower) * place,
-            radius=np.where(position < 0, 0.0, (self.upper - self.lower) / 2 * width),
-            is_outer=np.stack([begin == 0, begin + width == 1], axis=1),
-        )
 
     def pieces(self, max_items: int) -> Iterator[Piece]:
         """Yield pieces of about equally many sub-boxes, with `max_items` items on average.
@@ -279,7 +239,7 @@ class Frontier:
         Yields:
             Slices of the consecutive sub-boxes, and of the items that belong to them.
         """
-        n_boxes = len(self.position)
+        n_boxes = len(self.low)
         count = min(-(-len(self) // max_items), n_boxes)
         first_boxes = np.linspace(0, n_boxes, count + 1).astype(int)
         first_items = np.searchsorted(self.box, first_boxes)
@@ -303,14 +263,14 @@ class Frontier:
         Returns:
             The new items, ordered by sub-box and then by problem; no items if all codes are 0.
         """
-        d = self.position.shape[1]
+        d = self.low.shape[1]
         is_to_halve = (code > 0) & (code < FACES)
         to_halve = np.flatnonzero(is_to_halve)
         to_confine = np.flatnonzero(code >= FACES)
         # A sub-box has 2 d halves, lower and upper along each axis, and then 3^d faces.
         children_of_box = 2 * d + 3**d
         box = self.box[to_halve]
-        votes = np.bincount(box * d + code[to_halve] - 1, minlength=d * len(self.position))
+        votes = np.bincount(box * d + code[to_halve] - 1, minlength=d * len(self.low))
         axis = votes.reshape(-1, d).argmax(axis=1)[box]
         lower_half = box * children_of_box + 2 * axis
         faces = self.box[to_confine] * children_of_box + 2 * d + code[to_confine] - FACES
@@ -319,38 +279,37 @@ class Frontier:
 
         # Faces of different sub-boxes may coincide: they become one sub-box, and items one item.
         distinct_keys, child = np.unique(keys, return_inverse=True)
-        positions = self._child_positions(distinct_keys, children_of_box)
-        distinct_positions, of_key = np.unique(positions, axis=0, return_inverse=True)
+        ends, of_key = np.unique(self._child_ends(distinct_keys), axis=0, return_inverse=True)
         n_problems = int(problem.max(initial=0)) + 1
         items = np.unique(of_key[child] * n_problems + problem)
         new_box, new_problem = np.divmod(items, n_problems)
-        return Frontier(self.lower, self.upper, distinct_positions, new_box, new_problem)
+        return Frontier(self.lower, self.upper, *np.split(ends, 2, axis=1), new_box, new_problem)
 
-    def _child_positions(self, keys: Ints, children_of_box: int) -> Ints:
-        """Return the positions of the children of sub-boxes, shape (K, d).
+    def _child_ends(self, keys: Ints) -> Array:
+        """Return the lower and then the upper ends of the children of sub-boxes, shape (K, 2 d).
 
-        A position along an axis is 2^depth + index of a dyadic interval of the whole box, or
-        `LOWER` = −1 or `UPPER` = −2 for a sub-box that is confined to that end.
+        Children that coincide have the same numbers, as each axis is halved for itself.
 
         Args:
-            keys: Keys of K children, shape (K,): index of the parent × children_of_box + number.
-                The numbers 2 i and 2 i + 1 are the lower and the upper half along axis i; 2 d + Σ_i
-                3^i e_i is the child with the end e_i of each axis: 0 as the parent, 1 lower end, 2
+            keys: Keys of K children, shape (K,): index of the parent × (2 d + 3^d) + number. The
+                numbers 2 i and 2 i + 1 are the lower and the upper half along axis i; 2 d + Σ_i 3^i
+                e_i is the child with the end e_i of each axis: 0 as the parent, 1 lower end, 2
                 upper end.
-            children_of_box: Number of possible children of a sub-box, 2 d + 3^d.
         """
-        d = self.position.shape[1]
-        positions: Ints = self.position[keys // children_of_box].copy()
-        number = keys % children_of_box
-        halves = np.flatnonzero(number < 2 * d)
-        axis, is_upper = np.divmod(number[halves], 2)
-        positions[halves, axis] = 2 * positions[halves, axis] + is_upper
+        d = self.low.shape[1]
+        parent, number = np.divmod(keys, 2 * d + 3**d)
+        low = self.low[parent]
+        high = self.high[parent]
+        middle = (low + high) / 2
+        half = np.arange(2 * d).reshape(d, 2)
+        is_half = number[:, np.newaxis, np.newaxis] == half
         # The digits of a face to base 3 say for each axis: free, lower end, upper end.
-        faces = np.flatnonzero(number >= 2 * d)
-        digits = (number[faces, np.newaxis] - 2 * d) // 3 ** np.arange(d) % 3
-        ends = [digits == 1, digits == 2]
-        positions[faces] = np.select(ends, [LOWER, UPPER], positions[faces])
-        return np.asarray(positions)
+        face = np.maximum(number - 2 * d, 0)[:, np.newaxis] // 3 ** np.arange(d) % 3
+        ends = [
+            np.select([is_half[..., 1], face == 2], [middle, high], low),
+            np.select([is_half[..., 0], face == 1], [middle, low], high),
+        ]
+        return np.hstack(ends)
 
 
 @dataclass(eq=False)

@@ -69,9 +69,9 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
     # multipliers of each node, at which further cells begin
     multipliers = np.zeros((constants.shape[1], len(data.linear)))
     effort = CellEffort(
-        nodes=int(numbers.LEAST_PEAK_NODES),
-        steps=int(numbers.LEAST_PEAK_STEPS),
-        patience=int(numbers.LEAST_PEAK_PATIENCE),
+        nodes=numbers.LEAST_PEAK_NODES,
+        steps=numbers.LEAST_PEAK_STEPS,
+        patience=numbers.LEAST_PEAK_PATIENCE,
     )
 
     def bounded_cell(ends: Ints, number: int, parent_bound: float) -> PeakCell:
@@ -81,7 +81,7 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
         return PeakCell(max(bound, parent_bound), number, ends, node, at)
 
     cells = [bounded_cell(data.cell.astype(np.int64), 0, 0.0)]
-    for number in range(1, 2 * int(numbers.LEAST_PEAK_BISECTIONS), 2):
+    for number in range(1, 2 * numbers.LEAST_PEAK_BISECTIONS, 2):
         lowest = cells[0]
         halves = _halves(lowest, data)
         if halves is None:

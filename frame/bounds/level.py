@@ -226,9 +226,9 @@ class OutputBounds:
             remainder_multiple=remainder_multiple,
             wanted_gap=self.wanted_gap,
             incumbent=float(max(self.model_value.max(), self.attained)),
-            patience=int(numbers.PATIENCE),
-            ascents=int(numbers.ASCENTS),
-            grace=int(numbers.CELL_GRACE),
+            patience=numbers.PATIENCE,
+            ascents=numbers.ASCENTS,
+            grace=numbers.CELL_GRACE,
             min_progress=numbers.MIN_CELL_PROGRESS,
         )
 

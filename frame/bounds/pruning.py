@@ -56,7 +56,7 @@ def prune_ends(level: LevelModels, bounds: OutputBounds, above: Ints) -> PrunedB
     pruned_upper = np.full(len(above), -np.inf)
     # The first pass bounds each end by one cell of the modes' ranges, which is cheap. The second
     # tries the ends that are left with many cells.
-    for max_cells in (1, int(numbers.PRUNING_CELLS)):
+    for max_cells in (1, numbers.PRUNING_CELLS):
         for i in range(len(best_inputs)):
             if high[i] - low[i] < 2.0:  # pruned before
                 continue
@@ -106,7 +106,7 @@ def _bounds_over_piece(
     output, side = bounds.index
     inside = OutputBounds.initial(piece, output, side, bounds.wanted_gap, bounds.attained)
     inside.upper[:] = bounds.upper
-    effort = inside.effort(max_cells, int(numbers.PRUNING_STEPS), slack_below_peak=1.0)
+    effort = inside.effort(max_cells, numbers.PRUNING_STEPS, slack_below_peak=1.0)
     for node in above[np.argsort(-bounds.upper[above])]:
         inside.improve(np.array([node]), effort)
         if inside.upper[node] > bounds.attained + bounds.wanted_gap:

@@ -28,6 +28,7 @@ from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.errors import RefusedError
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.modes.structure import parameter_models
 from alphacut.frame.structures.linear import LinearSystem
 
 UNIT_ROUNDOFF = 2.0**-53
@@ -43,17 +44,20 @@ class AffineModel:
     """Stiffness, loads and output rows over a box, affine in its unit coordinates x.
 
     Args:
-        parts: Blocks [Kᵢ, fᵢ, rᵢᵀ] of degree 0 and of each of the d coordinates, shape
-            (1 + d, n, n + 1 + m) for n unknowns and m outputs.
-        remainder: Bound of what the affine functions leave out, shape (n, n + 1 + m).
+        blocks: [K, f, rᵀ] as affine functions with bounds of what these leave out, shape
+            (n, n + 1 + m) for n unknowns and m outputs.
         magnitudes: |Kᵢ| = (Kᵢ²)^½ for i = 1 … d, so that −|Kᵢ| ≤ Kᵢ ≤ |Kᵢ|, shape (d, n, n).
         is_affine: Whether the functions are affine, so that the remainders are rounding alone.
     """
 
-    parts: Array
-    remainder: Array
+    blocks: TaylorModel
     magnitudes: Array
     is_affine: bool = False
+
+    @cached_property
+    def parts(self) -> Array:
+        """Blocks [Kᵢ, fᵢ, rᵢᵀ] of degree 0 and of each coordinate, shape (1 + d, n, n + 1 + m)."""
+        return np.concatenate([self.blocks.homogeneous_part(k) for k in (0, 1)])
 
     @property
     def stiffness(self) -> Array:
@@ -72,21 +76,17 @@ class AffineModel:
     def on_subbox(self, low: Array, high: Array) -> AffineModel:
         """Return the model over a sub-box, with the coordinates that have width in it.
 
-        The remainders are those of this box. The rounding of the sums is added to them.
+        The remainders are those of this box and rounding.
 
         Args:
             low: Lower ends in unit coordinates of this box, shape (d,).
             high: Upper ends.
         """
-        wide = high > low
-        radius = ((high - low) / 2)[wide, None, None]
-        constant = self.parts[0] + np.tensordot((low + high) / 2, self.parts[1:], 1)
-        rounding = 2 * len(self.parts) * UNIT_ROUNDOFF * np.abs(self.parts).sum(axis=0)
+        wide = np.flatnonzero(high > low)
         return replace(
             self,
-            parts=np.concatenate([constant[None], radius * self.parts[1:][wide]]),
-            remainder=self.remainder + rounding,
-            magnitudes=radius * self.magnitudes[wide],
+            blocks=self.blocks.on_subbox(low, high).restricted_to(wide),
+            magnitudes=((high - low) / 2)[wide, None, None] * self.magnitudes[wide],
         )
 
     def has_ends_at_corners(self, output: int) -> Mask:
@@ -128,21 +128,16 @@ def affine_model(
         RefusedError: No load is static.
         UnprovedError: A function of the parameters has no bounds over the box.
     """
-    order = 1
-    variables = TaylorModel.variables((low + high) / 2, (high - low) / 2, order)
-    p = {name: variables[i] for i, name in enumerate(names)}
-    for name, value in system.parameters.items():
-        p.setdefault(name, TaylorModel.constant(value, len(names), order))
-    full = system.assembly(p)
+    parameters = parameter_models(system, names, (low + high) / 2, (high - low) / 2, order=1)
+    full = system.assembly(parameters)
     static = full.static
     if static is None:
         raise RefusedError("loads", "no static force", "a force whose history is static")
     n = len(full.pattern)
     rows = (full.row_factors[:, None] * full.rows)[:, :n]
     blocks = concatenate([full.stiffness, static, rows.T], -1)
-    parts = np.concatenate([blocks.homogeneous_part(0), blocks.homogeneous_part(1)])
-    magnitudes = [_magnitude(x) for x in parts[1:, :, :n]]
-    return AffineModel(parts, blocks.remainder, np.array(magnitudes).reshape(-1, n, n))
+    magnitudes = [_magnitude(x) for x in blocks.homogeneous_part(1)[:, :, :n]]
+    return AffineModel(blocks, np.array(magnitudes).reshape(-1, n, n))
 
 
 def _magnitude(matrix: Array) -> Array:
@@ -186,7 +181,7 @@ class Enclosure(NamedTuple):
     slope_radii: Array = np.zeros(0)
 
 
-class BoxProof:
+class StaticProof:
     """Bounds of outputs over one box.
 
     Args:
@@ -200,7 +195,7 @@ class BoxProof:
         self.model = model
         n = model.stiffness.shape[-1]
         # a symmetric matrix has no eigenvalue above its largest sum of magnitudes along a row
-        self.remainder = model.remainder[:, :n]
+        self.remainder = model.blocks.remainder[:, :n]
         rest = self.remainder.sum(axis=1).max(initial=0)
         low = model.stiffness[0] - model.magnitudes.sum(axis=0) - rest * np.eye(n)
         # A Cholesky factor that is found in floating point is that of a matrix which differs by
@@ -216,7 +211,7 @@ class BoxProof:
         inverse_factor = solve_triangular(self.factor, np.eye(n), lower=True)
         self.inverse_magnitudes = np.abs(inverse_factor.T @ inverse_factor)
         self.size = np.abs(model.stiffness).sum(axis=0)
-        self.displacements = self._solve(model.loads, model.remainder[:, n])
+        self.displacements = self._solve(model.loads, model.blocks.remainder[:, n])
         self.proofs: dict[int, Enclosure] = {}
 
     @cached_property
@@ -272,7 +267,7 @@ class BoxProof:
         n = len(self.size)
         rows = model.row(output)
         u = self.displacements
-        z = self._solve(rows, model.remainder[:, n + 1 + output])
+        z = self._solve(rows, model.blocks.remainder[:, n + 1 + output])
 
         # the polynomial Z·f − Σ xᵢ xⱼ (Kᵢ Zⱼ)·U by degree
         of_loads = z.terms @ model.loads.T
@@ -281,7 +276,7 @@ class BoxProof:
         quadratic = of_loads[1:, 1:] - z.products @ u.terms[0]
         cubic = np.einsum("ija,ka->ijk", z.products, u.terms[1:], optimize=True)
         error = z.norm * u.norm
-        error += np.abs(z.terms).sum(axis=0) @ model.remainder[:, n]
+        error += np.abs(z.terms).sum(axis=0) @ model.blocks.remainder[:, n]
         error += z.leftover @ np.abs(u.terms).sum(axis=0)
         error += np.abs(cubic).sum()
         magnitude = abs(constant) + np.abs(linear).sum() + np.abs(quadratic).sum()
@@ -361,7 +356,7 @@ class StaticSearch:
         self.model = affine_model(system, names, low, high)
         if self._is_affine():
             self.model = replace(self.model, is_affine=True)
-        self._proofs: dict[bytes, BoxProof] = {}
+        self._proofs: dict[bytes, StaticProof] = {}
         self._values: dict[bytes, tuple[AffineModel, Array]] = {}
         self._corners: dict[int, Mask] = {}
 
@@ -377,7 +372,7 @@ class StaticSearch:
         except UnprovedError:
             return False
         largest = np.abs(wide.parts).max(axis=(0, 1))  # of each column: units differ
-        return bool((wide.remainder.max(axis=0) <= AFFINE * largest).all())
+        return bool((wide.blocks.remainder.max(axis=0) <= AFFINE * largest).all())
 
     def size(self, output: int, point: Array) -> float:
         """Return Σ |rₐ uₐ| of an output at parameters in SI units, its magnitude without signs."""
@@ -389,7 +384,7 @@ class StaticSearch:
         radius = (self.high - self.low) / 2
         return np.asarray((points - (self.low + self.high) / 2) / np.where(radius > 0, radius, 1.0))
 
-    def proof(self, low: Array, high: Array) -> tuple[BoxProof, Ints]:
+    def proof(self, low: Array, high: Array) -> tuple[StaticProof, Ints]:
         """Return the proof over a sub-box, in SI units, and the parameters that have width in it.
 
         Raises:
@@ -406,7 +401,7 @@ class StaticSearch:
                 over_box = affine_model(self.system, self.names, low, high)
                 has_width: Array = np.where(high > low, 1.0, 0.0)
                 over_box = over_box.on_subbox(-has_width, has_width)
-            self._proofs[key] = BoxProof(over_box)
+            self._proofs[key] = StaticProof(over_box)
         return self._proofs[key], wide
 
     def value(self, output: int, point: Array) -> float:

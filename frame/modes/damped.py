@@ -19,6 +19,7 @@ from alphacut.frame.calculus.monomials import matmul, product_part
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate, solution_series, solve
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.geometric_mean import geometric_mean
+from alphacut.frame.modes.structure import parameter_models
 from alphacut.frame.records.history import History
 from alphacut.frame.response.duhamel import absolute_moments
 from alphacut.frame.structures.linear import LinearSystem
@@ -66,13 +67,9 @@ class DampedStructure:
         """
         from scipy.linalg import eigh  # takes time to import
 
-        d = len(boxes.names)
-        inputs = TaylorModel.variables(boxes.centre, boxes.radius, order)
-        values = {**system.parameters, **(fixed or {})}
-        parameters = {name: TaylorModel.constant(x, d, order) for name, x in values.items()}
-        for i, name in enumerate(boxes.names):
-            parameters[name] = inputs[i]
-        full = system.assembly(parameters)
+        full = system.assembly(
+            parameter_models(system, boxes.names, boxes.centre, boxes.radius, order, fixed=fixed)
+        )
         a, b = full.rayleigh
         damping = full.dashpots
         if a.magnitude() > 0:

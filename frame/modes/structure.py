@@ -7,13 +7,13 @@ reason. A structure of one unknown has one mode, whatever its damping.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.frame.calculus.taylor_model import TaylorModel, solve
+from alphacut.frame.calculus.taylor_model import ORDER, TaylorModel, solve
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.structures.linear import Assembly, LinearSystem, histories, stack
 
@@ -49,6 +49,31 @@ class ClassicalStructure:
     def distinct_orders(self) -> list[int]:
         """Derivatives of the displacements that some output takes, rising."""
         return [int(order) for order in np.unique(self.derivative_orders)]
+
+
+def parameter_models(
+    system: LinearSystem,
+    names: Sequence[str],
+    midpoint: Array,
+    radius: Array,
+    order: int = ORDER,
+    *,
+    fixed: Mapping[str, float] | None = None,
+) -> dict[str, TaylorModel]:
+    """Return all parameters of a structure by name, as scalar Taylor models of d inputs.
+
+    Args:
+        system: The structure.
+        names: Names of the inputs, d of them.
+        midpoint: Midpoints of their ranges, shape (d,), in SI units.
+        radius: Half-widths of their ranges, shape (d,).
+        order: Order of the models.
+        fixed: Values of other parameters by name, where they are not nominal.
+    """
+    inputs = TaylorModel.variables(midpoint, radius, order)
+    values = {**system.parameters, **(fixed or {})}
+    parameters = {name: inputs.like(value) for name, value in values.items()}
+    return parameters | {name: inputs[i] for i, name in enumerate(names)}
 
 
 def classical_structure(

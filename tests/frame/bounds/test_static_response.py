@@ -7,7 +7,7 @@ import pytest
 
 from alphacut.base.errors import RefusedError
 from alphacut.frame import Force, History, Limit, MatrixStructure, StoreyFrame, static_bounds
-from alphacut.frame.bounds.static_response import BoxProof, StaticSearch
+from alphacut.frame.bounds.static_response import StaticProof, StaticSearch
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.fuzzy import Crisp, Interval, Triangular
 
@@ -84,7 +84,7 @@ def test_values_lie_within_the_bounds_of_one_box(rng, groups):
     low = rng.uniform(0.6, 0.9, len(names))
     high = low + rng.uniform(0.1, 0.5, len(names))
     search = StaticSearch(structure, names, low, high)
-    proof = BoxProof(search.model)
+    proof = StaticProof(search.model)
     points = low + (high - low) * rng.uniform(0, 1, (300, len(names)))
     ends = np.where(rng.uniform(0, 1, (300, len(names))) < 0.5, low, high)
     values = exact(structure, [(*x, -10e3) for x in np.vstack([points, ends])])
@@ -98,7 +98,7 @@ def test_derivatives_lie_within_their_radii(rng):
     structure = truss([(0, 1, 2), (3, 4), (5, 6)])
     names = ("s1", "s2", "s3")
     low, high = np.full(3, 0.7), np.full(3, 1.3)
-    proof = BoxProof(StaticSearch(structure, names, low, high).model)
+    proof = StaticProof(StaticSearch(structure, names, low, high).model)
     step = 1e-5
     for point in rng.uniform(low, high, (40, 3)):
         for axis in range(3):
@@ -116,9 +116,9 @@ def test_the_error_of_one_box_is_of_fourth_order():
     widths = []
     for radius in (0.2, 0.1):
         low, high = np.full(2, 1 - radius), np.full(2, 1 + radius)
-        proof = BoxProof(StaticSearch(structure, ("s1", "s2"), low, high).model)
+        proof = StaticProof(StaticSearch(structure, ("s1", "s2"), low, high).model)
         u = proof.displacements
-        z = proof._solve(proof.model.row(2), proof.model.remainder[:, 7 + 1 + 2])
+        z = proof._solve(proof.model.row(2), proof.model.blocks.remainder[:, 7 + 1 + 2])
         widths.append(u.norm * z.norm)
     assert 8 < widths[0] / widths[1] < 40  # 16 in the limit
 
@@ -236,7 +236,7 @@ def spring(row=(1.0,)):
 @pytest.mark.parametrize("radius", [0.1, 0.3])
 def test_the_slopes_of_a_spring_lie_just_within_their_radii(radius):
     ends = np.array([1 - radius]), np.array([1 + radius])
-    known = BoxProof(StaticSearch(spring(), ("p",), *ends).model).enclosure(0)
+    known = StaticProof(StaticSearch(spring(), ("p",), *ends).model).enclosure(0)
     steepest = -radius / (1 - radius) ** 2  # of 1/p by x, p = 1 + radius x
     assert known.slopes[0] == pytest.approx(-radius)
     excess = known.slope_radii[0] - (known.slopes[0] - steepest)
@@ -260,7 +260,7 @@ def test_two_loads_on_one_spring_add_up_only_at_one_corner(rng):
     radius = 0.04
     low, high = np.full(2, 1 - radius), np.full(2, 1 + radius)
     search = StaticSearch(spring(), ("p", "F"), low, high)
-    known = BoxProof(search.model).enclosure(0)
+    known = StaticProof(search.model).enclosure(0)
     assert known.upper >= (1 + radius) / (1 - radius)  # the mixed term adds at this corner
     assert known.lower <= (1 - radius) / (1 + radius)
     assert known.upper <= (1 + radius) / (1 - radius) + 2 * radius**2
@@ -272,7 +272,7 @@ def test_a_length_is_bounded_over_one_box(rng):
         loads=[Force(1, 20e3, AT_REST)], outputs=("q1",),
     )  # fmt: skip
     low, high = np.array([2.95]), np.array([3.05])
-    known = BoxProof(StaticSearch(frame, ("l1",), low, high).model).enclosure(0)
+    known = StaticProof(StaticSearch(frame, ("l1",), low, high).model).enclosure(0)
     at_ends = 20e3 * np.array([2.95, 3.05]) ** 3 / (24 * 30e9 * 1e-5)
     assert known.lower <= at_ends[0] <= at_ends[1] <= known.upper
     assert known.slope_radii[0] == np.inf
