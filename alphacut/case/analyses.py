@@ -32,18 +32,15 @@ class Analysis(NamedTuple):
         answer: Class of the answer.
         pictures: Figures of the answer by their names. They stand on the page in the section of the
             answer, in this order.
-        section: Class of the section of the case: a `Section` with its function `compute`, or a
-            frozen dataclass of options derived from `alphacut.frame.analyses.question:Question`,
-            from which the section is made. Empty for an answer that follows from another section.
-        compute: Function of section, response and progress that returns the answer; empty where
-            the options answer themselves, or the stage of another section does.
+        section: Class of the section of the case: a `Section` with a stage of its own, or a frozen
+            dataclass of options derived from `alphacut.frame.analyses.question:Question`, from
+            which the section is made. Empty for an answer that follows from another section.
         stage: Name of the stage, which a case lists in `stages`, that computes the answer.
     """
 
     answer: str
     pictures: Mapping[str, Picture]
     section: str = ""
-    compute: str = ""
     stage: str = "envelope"
 
 
@@ -56,8 +53,7 @@ ANALYSES: dict[str, Analysis] = {
                 "Fuzzy probability of exceeding a limit, over the limit",
             )
         },
-        "alphacut.case.limits:ProbabilitySection",
-        "alphacut.stages.answers:probability_of",
+        "alphacut.frame.analyses.probability:ProbabilityQuestion",
     ),
     "decision": Analysis(
         "alphacut.frame:Decision",
@@ -67,8 +63,7 @@ ANALYSES: dict[str, Analysis] = {
                 "Fuzzy peak of each limited output over its limit",
             )
         },
-        "alphacut.case.limits:DecisionSection",
-        "alphacut.stages.answers:decision",
+        "alphacut.frame.analyses.decision:DecisionQuestion",
     ),
     "tolerances": Analysis(
         "alphacut.frame:Tolerances",
@@ -99,8 +94,7 @@ ANALYSES: dict[str, Analysis] = {
                 " the state (points), and bands of the tolerances",
             ),
         },
-        "alphacut.case.limits:FragilitySection",
-        "alphacut.stages.answers:fragility_answer",
+        "alphacut.frame.analyses.fragility:FragilityQuestion",
     ),
     "floor_spectrum": Analysis(
         "alphacut.frame:FloorSpectrum",
@@ -111,8 +105,7 @@ ANALYSES: dict[str, Analysis] = {
                 " nominal structure",
             )
         },
-        "alphacut.case.floors:FloorSpectrumSection",
-        "alphacut.stages.answers:floor_spectra",
+        "alphacut.frame.analyses.floor_spectrum:FloorQuestion",
     ),
     "response_spectrum": Analysis(
         "alphacut.frame:SpectrumResponse",

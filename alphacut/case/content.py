@@ -10,7 +10,7 @@ from pathlib import Path
 from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.analyses import ANALYSES
 from alphacut.case.cell import CellContent
-from alphacut.case.limits import AnalysisSection, FragilitySection, QuestionSection
+from alphacut.case.limits import AnalysisSection, QuestionSection
 from alphacut.case.loads import ForceSection, RecordsSection, with_forces
 from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection, Identify, Study
@@ -60,12 +60,10 @@ class Content(CellContent):
         return {key: section for key, section in asked if isinstance(section, QuestionSection)}
 
     @property
-    def incremental_question(self) -> FragilitySection | None:
+    def incremental_question(self) -> QuestionSection | None:
         """The question of fragility, with one limit of each storey, if columns yield; else None."""
-        question = self.questions.get(FragilitySection.key)
-        if not isinstance(question, FragilitySection) or self.structure is None:
-            return None
-        return question if yields(self.structure.model) else None
+        is_of_yielding = self.structure is not None and yields(self.structure.model)
+        return self.questions.get("fragility") if is_of_yielding else None
 
     @property
     def limited_outputs(self) -> tuple[str, ...]:
@@ -252,7 +250,7 @@ class Content(CellContent):
             require(not getattr(self, key), key, "beside [records]", allowed)
 
     def _require_directions(self, records: RecordsSection, section: StructureSection) -> None:
-        """Refuse records whose components are not those of the structure, and what needs two.
+        """Refuse records whose components are not those of the structure.
 
         Args:
             records: The section.
@@ -260,16 +258,15 @@ class Content(CellContent):
 
         Raises:
             RefusedError: The ground moves in another number of directions; one side of an output is
-                limited over all angles of incidence, where only magnitudes are bounded; or
-                fragility is over a measure of two components and records have one.
+                limited over all angles of incidence, where only magnitudes are bounded.
         """
         count = records.component_count
         expected = section.direction_count
         allowed = f"{expected} a record, one for each direction of the ground"
         cure = 'name the directions in [matrices], as directions = ["x", "y"]'
         require(count == expected, "records.files", f"{count} files a record", allowed, cure)
-        for question in self.asked().values():
-            question.require_records(components=count, all_angles=records.has_all_angles)
+        for question in self.asked().values() if records.has_all_angles else ():
+            question.require_all_angles()
 
     def _one_structure(self) -> Structure:
         """Return the structure of the case, without what later stages compute.

@@ -13,17 +13,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Literal, Self, cast
 
-from pydantic import Field, PlainValidator
+from pydantic import PlainValidator
 
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.case.structure import Structure
-from alphacut.case.types import NotEmpty, Quantity, Section
+from alphacut.case.types import NotEmpty, Section
 from alphacut.frame import Limit
-from alphacut.frame.analyses.damage_states import require_states
-from alphacut.frame.analyses.limits import Side, limits_by_name, require_fragile
+from alphacut.frame.analyses.limits import Side, limits_by_name
 from alphacut.frame.structures.quantities import OUTPUTS, Output
-from alphacut.frame.structures.storey import yields
 from alphacut.io import quantity
 
 BASE_SHEAR = "base_shear"
@@ -232,12 +230,14 @@ class AnalysisSection(Section):
     """A section that asks for an analysis of the structure, or of its response.
 
     `key`: name of the section. `reads_peaks`: the answer follows from the peaks of the limited
-    outputs. `records`: whether a suite [records] is refused beside it, allowed or needed.
+    outputs. `records`: whether a suite [records] is refused beside it, allowed or needed;
+    `all_angles`: whether its components may come from all angles.
     """
 
     key: ClassVar[str]
     reads_peaks: ClassVar[bool] = False
     records: ClassVar[Literal["refused", "allowed", "needed"]] = "refused"
+    all_angles: ClassVar[bool] = True
 
     def with_storeys(self, structure: Structure) -> Self:
         """Return the section with what it says of every storey said of each."""
@@ -251,13 +251,9 @@ class AnalysisSection(Section):
             components: Number of components of the records that will move it; 0 without records.
         """
 
-    def require_records(self, *, components: int, all_angles: bool) -> None:
-        """Refuse what a suite of records of so many components does not answer.
-
-        Args:
-            components: Number of components of each record.
-            all_angles: Whether records of two components come from all angles of incidence.
-        """
+    def require_all_angles(self) -> None:
+        """Refuse what is not answered over all angles of incidence of two components."""
+        require(self.all_angles, self.key, "over all angles", "an angle in records.angle")
 
     def require_computable(self, structure: Structure, fuzzy: Sequence[str]) -> None:
         """Refuse what cannot be computed, once the structure has its materials.
@@ -267,6 +263,23 @@ class AnalysisSection(Section):
                 known yet.
             fuzzy: Names of the fuzzy inputs of [envelope].
         """
+
+    @contextmanager
+    def by_its_keys(self) -> Iterator[None]:
+        """Name the key of the case in each RefusedError of the block, in place of an argument.
+
+        Fields are keys of the section, and "limit of …" is one of its limits. What is no key, as
+        "structure", stands behind the name of the section.
+        """
+        try:
+            yield
+        except RefusedError as error:
+            name = "limits" if error.key.startswith("limit of") else error.key
+            if name in type(self).model_fields:
+                name = f"{self.key}.{name}"
+            elif not name.startswith(self.key):
+                name = f"{self.key}: {name}"
+            raise RefusedError(name, error.value, error.allowed, error.cure) from None
 
 
 class QuestionSection(AnalysisSection):
@@ -302,138 +315,13 @@ class QuestionSection(AnalysisSection):
         limits = tuple(limit.limit(structure, key) for limit in self.limits)
         structure.require_quantities(key, list(dict.fromkeys(x.output for x in self.limits)))
         # Refuses limits that do not fit each other or the question; () stands for any outputs.
-        with _naming(key):
+        with self.by_its_keys():
             limits_by_name(limits, (), magnitudes=self.needs_magnitudes)
         return limits
 
-    def require_answerable(self, structure: Structure, components: int) -> None:
-        """Refuse outputs that the structure lacks, and limits that this question cannot take."""
-        self.limits_of(structure)
-
-    def require_records(self, *, components: int, all_angles: bool) -> None:
+    def require_all_angles(self) -> None:
         """Refuse limits of one side over all angles, where only magnitudes are bounded."""
-        sides = [limit.text for limit in self.limits if limit.side in ("max", "min")]
-        is_bounded = not (sides and all_angles)
+        super().require_all_angles()
+        sides = ", ".join(limit.text for limit in self.limits if limit.side in ("max", "min"))
         allowed = "magnitudes over all angles, as roof <= 40 mm"
-        require(is_bounded, f"{self.key}.limits", ", ".join(sides), allowed)
-
-
-@contextmanager
-def _naming(key: str) -> Iterator[None]:
-    """Replace the key "limits" of a RefusedError raised in the block by the key in the case.
-
-    Args:
-        key: Key of the limits in the case, such as "decision.limits". It replaces "limits" and
-            "limit of …", the names in the Python interface; errors with other keys pass with their
-            own.
-
-    Raises:
-        RefusedError: Each one that the block raises, with value, allowed values and hint unchanged.
-    """
-    try:
-        yield
-    except RefusedError as error:
-        name = error.key
-        if name == "limits" or name.startswith("limit of"):
-            name = key
-        if name == "states":
-            name = "fragility.states"
-        raise RefusedError(name, error.value, error.allowed, error.cure) from None
-
-
-class DecisionSection(QuestionSection):
-    """Possibility and necessity that limits are exceeded."""
-
-    key = "decision"
-    reads_peaks = True
-    records = "allowed"
-
-
-class ProbabilitySection(QuestionSection):
-    """Fuzzy probability that limits are exceeded; inputs that are not random stay fuzzy."""
-
-    key = "probability"
-    needs_magnitudes = True
-
-    random: tuple[str, ...] = ()
-    """inputs that are random, with the shape of their membership"""
-    # The error of a probability p falls as √(p (1 − p)/samples): 200 give 0.035 at p = 1/2. Each
-    # sample is a response at each fuzzy point, so that more take long.
-    samples: Annotated[int, Quantity(minimum=1, maximum=10_000, is_integer=True)] = 200
-    """random draws at each fuzzy point"""
-
-    def require_answerable(self, structure: Structure, components: int) -> None:
-        """Refuse limits and random inputs that the structure does not have.
-
-        Raises:
-            RefusedError: A limit does not fit the structure, or a random input other than E is
-                unknown or crisp.
-        """
-        super().require_answerable(structure, components)
-        # A modulus E that stage modulus computes is still crisp here, and may be random in the run.
-        structure.inputs([name for name in self.random if name != "E"], "probability.random")
-
-
-class FragilitySection(QuestionSection):
-    """Fraction of the records under which limits are exceeded, over a measure of records."""
-
-    key = "fragility"
-    reads_peaks = True
-    records = "needed"
-
-    limits: tuple[AnyLimit, ...] = ()
-    """limits of outputs, as of [decision]; or states"""
-    states: dict[str, Limits] = Field(default_factory=dict)
-    """in place of limits: those of damage states by name, from the slightest on, as
-    'slight = ["drift <= 0.5 %"]'; a state begins with the first of its limits in any storey"""
-    measure: Literal["Sa(T1)", "PGA", "scale", "RotD50(T1)", "RotD100(T1)"] = "Sa(T1)"
-    """measure of a record; Sa(T1) is the pseudo-acceleration `ω² max |u|` at the nominal
-    structure's first period, with its own damping ratio (not 5 %); of two components RotD50(T1) is
-    its median over all directions, and RotD100(T1) the largest one"""
-    independent: bool = False
-    """whether records count as independent draws: 95 % limits"""
-    most: Annotated[float, Quantity(above=0, maximum=100)] = 2.0
-    """of columns that yield: largest measure tried, as a multiple of the one at which the nominal
-    structure would reach all limits under all records if it were elastic"""
-
-    def require_consistent(self) -> None:
-        """Refuse limits beside states, and neither of them."""
-        super().require_consistent()
-        value = "beside states" if self.limits else None
-        is_one = bool(self.limits) != bool(self.states)
-        require(is_one, "fragility.limits", value, "limits, or the limits of states")
-
-    def with_storeys(self, structure: Structure) -> Self:
-        """Return the section with each limit of every storey as one limit for each storey.
-
-        The limits of the states are among them, each with its state as its event.
-        """
-        limits = list(super().with_storeys(structure).limits)
-        for name, members in self.states.items():
-            of_storeys = (x for limit in members for x in limit.by_storey(structure))
-            limits += [replace(limit, event=name) for limit in of_storeys]
-        return self.model_copy(update={"limits": tuple(limits)})
-
-    def require_records(self, *, components: int, all_angles: bool) -> None:
-        """Refuse what `QuestionSection` does, and a measure of more components than there are."""
-        super().require_records(components=components, all_angles=all_angles)
-        is_measured = components > 1 or not self.measure.startswith("RotD")
-        require(is_measured, "fragility.measure", self.measure, "beside records of two components")
-
-    def require_answerable(self, structure: Structure, components: int) -> None:
-        """Refuse a structure and limits of which no fragility can be computed.
-
-        Raises:
-            RefusedError: The structure has forces or does not start at rest; a limit does not fit
-                it, or does not limit a magnitude; the states do not rise; or `most`, the largest
-                intensity tried, is stated though no columns yield.
-        """
-        super().require_answerable(structure, components)
-        with _naming("fragility.limits"):
-            limits = self.limits_of(structure)
-            require_fragile(structure.model, limits)
-            if self.states:
-                require_states(list(self.states), limits_by_name(limits, ()))
-        # Peaks of elastic columns are proportional to the record: no intensities are tried.
-        is_used = yields(structure.model) or not self.has_key("most")
-        require(is_used, "fragility.most", self.most, "beside columns that yield")
+        require(not sides, f"{self.key}.limits", sides, allowed)

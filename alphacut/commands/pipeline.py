@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
 from pathlib import Path
+from typing import Any, cast
 
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.kept_files import locked
@@ -24,8 +25,9 @@ from alphacut.case.spectrum import ResponseSpectrumSection
 from alphacut.case.structure import Structure
 from alphacut.commands.motion_text import load_end_warnings
 from alphacut.commands.options import read_case
-from alphacut.frame.analyses.incremental import Increments
+from alphacut.frame.analyses.fragility import FragilityQuestion
 from alphacut.frame.analyses.peaks import Peak, Peaks
+from alphacut.frame.analyses.question import Asked
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, rank, require_writable, say
 from alphacut.io.results import MANIFEST, ResultsFolder
@@ -42,7 +44,7 @@ from alphacut.stages import (
     spectrum,
     suite,
 )
-from alphacut.stages.answers import Response
+from alphacut.stages.answers import asked_of
 from alphacut.stages.cell import CellProblem
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.modulus import fuzzy_loss, fuzzy_modulus
@@ -263,15 +265,16 @@ class Pipeline:
         results.structure = structure
         (task,) = envelope.tasks(section, ())  # of [envelope] itself
         if content.records is not None:
-            response = self._suite_response(content.records, structure, task)
+            asked = self._asked_of_suite(content.records, structure, task)
         else:
             self._compute_envelopes(structure, section)
             limits = content.limits_where_yielding(structure)
             task = replace(task, limited=content.limited_outputs, limits=limits)
             peaks = self._limited_peaks(task, structure)
-            response = Response(structure, task, peaks)
+            asked = asked_of(structure, task.fuzzy, section.alpha, peaks=peaks, **task.times)
         for key, question in content.asked().items():
-            results.answers[key] = self.store.take(answers.stage(key, question, response)).numbers
+            stage = answers.stage(key, question, structure, asked)
+            results.answers[key] = self.store.take(stage).numbers
 
     def _structure(self) -> Structure:
         """Return the structure with the material that stage modulus found, if there is one."""
@@ -295,8 +298,8 @@ class Pipeline:
         """
         self.results.structure = structure = self._structure()
         for key, question in self.content.asked(stage).items():
-            assert isinstance(question, GeneratedSection)  # others have stages above
-            alone = answers.stage_alone(key, question, structure)
+            asked = asked_of(structure, *(getattr(question, name) for name in ("fuzzy", "alpha")))
+            alone = answers.stage(key, question, structure, asked)
             self.results.answers[key] = self.store.take(alone).numbers
 
     def _compute_spectrum(self) -> None:
@@ -362,10 +365,10 @@ class Pipeline:
             envelope.require_tolerance(result, task, structure)
             results.envelopes[task.name] = result
 
-    def _suite_response(
+    def _asked_of_suite(
         self, section: RecordsSection, structure: Structure, task: EnvelopeTask
-    ) -> Response:
-        """Compute peaks under each record of a suite, and return the response for the questions.
+    ) -> Asked:
+        """Compute peaks under each record of a suite, and return what questions are asked about.
 
         Args:
             section: The records of the case.
@@ -373,9 +376,8 @@ class Pipeline:
             task: The response of [envelope]: names of the fuzzy inputs, time step and α-levels.
 
         Returns:
-            The response with the peaks over the suite, which are put into `results.suite`, too. If
-            columns yield and fragility is asked for, it also has the peaks at rising intensity of
-            each record.
+            The peaks over the suite, which are put into `results.suite`, too. If columns yield and
+            fragility is asked for, also the peaks at rising intensity of each record.
 
         Raises:
             RefusedError: A record or a limit does not fit the structure.
@@ -395,16 +397,18 @@ class Pipeline:
         by_record = {record.name: outcomes[f"record_{record.name}"].numbers for record in records}
         found = suite.suite_peaks(structure, task, records, by_record)
         self.results.suite = found
-        increments: dict[str, Increments] = {}
-        if (question := self.content.incremental_question) is not None:
-            analyses = suite.analyses_of(question, structure, task, longest_first)
-            further = [
-                suite.incremental_stage(question, structure, name, analysis)
-                for name, analysis in analyses.items()
-            ]
-            scaled = self.store.take_all(further, self.executor)
-            increments = {x.name: scaled[f"incremental_{x.name}"].numbers for x in records}
-        return Response(structure, task, found.peak, found, increments, records)
+        response: dict[str, Any] = {"peaks": found.peak, "suite": found, **task.times}
+        asked = asked_of(structure, task.fuzzy, task.section.alpha, records=records, **response)
+        if (fragility := self.content.incremental_question) is None:
+            return asked
+        generated = cast("GeneratedSection", fragility)
+        question = cast("FragilityQuestion", generated.question(structure))
+        analyses = question.analyses(replace(asked, records=tuple(longest_first)))
+        named = question.named_limits
+        further = [suite.incremental_stage(named, *analysis) for analysis in analyses.items()]
+        scaled = self.store.take_all(further, self.executor)
+        increments = {x.name: scaled[f"incremental_{x.name}"].numbers for x in records}
+        return replace(asked, increments=increments)
 
     def _limited_peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
         """Return the peaks that questions are asked about, by name.

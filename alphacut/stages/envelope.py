@@ -100,6 +100,11 @@ class EnvelopeTask:
     limited: tuple[str, ...] = ()
     limits: tuple[frame.Limit, ...] = ()
 
+    @property
+    def times(self) -> dict[str, float]:
+        """Length of the response and distance of its time nodes in s, by the names of arguments."""
+        return {"duration": self.duration, "step": self.section.step}
+
     def tolerance(self, structure: Structure) -> Tolerance:
         """Return the error of the envelope that the case allows, or a thousandth of each peak.
 
@@ -304,12 +309,8 @@ class EnvelopeTask:
         Raises:
             RefusedError: An input is unknown or crisp.
         """
-        return {
-            "inputs": structure.inputs(self.fuzzy),
-            "duration": self.duration,
-            "step": self.section.step,
-            "alpha": self.section.alpha,
-        }
+        alpha = self.section.alpha
+        return {"inputs": structure.inputs(self.fuzzy), "alpha": alpha, **self.times}
 
 
 def outputs_of(peaks: Sequence[str]) -> tuple[str, ...]:

@@ -9,15 +9,13 @@ from functools import partial
 import numpy as np
 
 from alphacut.base.number_text import engineering
-from alphacut.case.limits import FragilitySection
 from alphacut.case.loads import RecordsSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
-from alphacut.frame import Accelerogram, Peak, ScaledSuite, SuitePeaks, scale_suite
+from alphacut.frame import Accelerogram, Limit, Peak, ScaledSuite, SuitePeaks, scale_suite
 from alphacut.frame.analyses.angles import turned_components
-from alphacut.frame.analyses.fragility import incremental_analyses, increments_of
+from alphacut.frame.analyses.fragility import increments_of
 from alphacut.frame.analyses.incremental import IncrementalAnalysis, Increments
-from alphacut.frame.analyses.limits import limits_by_name
 from alphacut.frame.analyses.suites import (
     ScaledRecord,
     record_peaks,
@@ -27,7 +25,6 @@ from alphacut.frame.analyses.suites import (
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.quantities import output_of
-from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy.result import Nature
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.store import Stage, StageContext, StageResult
@@ -240,58 +237,20 @@ def suite_peaks(
     )
 
 
-def analyses_of(
-    section: FragilitySection,
-    structure: Structure,
-    task: EnvelopeTask,
-    records: Sequence[ScaledRecord],
-) -> dict[str, IncrementalAnalysis]:
-    """Return the incremental dynamic analysis of a frame that yields, for each record by its name.
-
-    An analysis moves the frame by its record at rising intensities.
-
-    Args:
-        section: Question: its limits, intensity measure, and largest intensity.
-        structure: A frame whose columns yield.
-        task: Names of the fuzzy inputs, time step and α-levels.
-        records: The scaled records.
-
-    Raises:
-        RefusedError: An input or a limit does not fit the structure.
-    """
-    frame = structure.model
-    assert isinstance(frame, StoreyFrame)
-    return incremental_analyses(
-        frame,
-        structure.inputs(task.fuzzy),
-        records,
-        limits_by_name(section.limits_of(structure), ()),  # () allows any outputs
-        intensity=section.measure,
-        most=section.most,
-        step=task.section.step,
-        alpha=task.section.alpha,
-    )
-
-
 def incremental_stage(
-    section: FragilitySection, structure: Structure, name: str, analysis: IncrementalAnalysis
+    limits: Mapping[str, Limit], name: str, analysis: IncrementalAnalysis
 ) -> Stage[Increments]:
     """Return the stage that moves a frame that yields by a record at rising intensities.
 
     Args:
-        section: The question, whose limits name the outputs.
-        structure: The frame.
+        limits: The limits by name.
         name: Name of the record. The stage is named "incremental_NAME".
         analysis: The incremental dynamic analysis of the frame under this record, with its fuzzy
             inputs and the same limits.
 
     Returns:
         Stage of the bounds of the peaks over the intensity, for each limit.
-
-    Raises:
-        RefusedError: A limit does not fit the structure.
     """
-    limits = limits_by_name(section.limits_of(structure), ())  # () allows any outputs
 
     def compute(context: StageContext) -> StageResult[Increments]:
         """Return the bounds over the intensity for each limit, reporting progress."""

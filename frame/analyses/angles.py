@@ -13,7 +13,7 @@ It is attained at ψ if r₀ ≥ 0, and else at ψ + π.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import cos, pi, sin
 from typing import Any, NamedTuple
@@ -22,9 +22,9 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, checked_number
-from alphacut.base.number_text import Table, engineering, range_text
+from alphacut.base.number_text import engineering, range_text
 from alphacut.base.progress_bar import Progress, nth_subprogress
-from alphacut.frame.analyses.answer import Answer, Record, known, table_of
+from alphacut.frame.analyses.answer import Answer, Row
 from alphacut.frame.analyses.peaks import Peak, WorstCase, close_peaks, largest_peaks
 from alphacut.frame.boxes import ALPHA
 from alphacut.frame.dynamics.nonlinear import make_flow
@@ -110,50 +110,44 @@ class AnglePeaks(Answer):
     units: dict[str, str]
     peak: dict[str, Peak]
 
-    def table(self) -> Table:
-        """Return a table of texts with a row for each output.
+    def text_rows(self) -> Iterator[Row]:
+        """Yield a row for each output.
 
         The columns are its name, the range of its peaks at the lowest level, the guarantee, the
         attained value, and its angle and time.
         """
-        rows = []
         for name, peak in self.peak.items():
             unit = self.units[name]
             ends = range_text(float(peak.lower[0]), float(peak.upper[0]), peak.nature)
-            row = {
+            row: dict[str, str | Nature] = {
                 "peak of": name,
                 f"at α = {self.alpha[0]:g}": f"{ends} {unit}",
-                "nature": self.nature_text(peak.nature),
+                "nature": peak.nature,
                 "reached": "not known",
                 "angle and time": "",
             }
             if (worst := peak.worst) is not None:
                 row["reached"] = engineering(float(peak.reached[0]), unit)
                 row["angle and time"] = f"{worst.angle:.1f}°, {worst.time:.4g} s"
-            rows.append(row)
-        return table_of(rows)
+            yield row
 
-    def records(self) -> list[Record]:
-        """Return a row for each output, over all angles.
+    def number_rows(self) -> Iterator[Row]:
+        """Yield a row for each output, over all angles.
 
         The columns are its name and SI unit, the bound of the farthest peak and the attained value
-        on the lowest level, angle in degrees and time of the latter, and the guarantee. Unknown
-        numbers are None.
+        on the lowest level, angle in degrees and time of the latter, and the guarantee.
         """
-        rows: list[Record] = []
         for name, peak in self.peak.items():
             worst = peak.worst or WorstCase(np.nan, np.nan)
-            row: Record = {
+            yield {
                 "output": name,
                 "unit": self.units[name],
-                "farthest peak": known(peak.upper[0]),
-                "peak reached": known(peak.reached[0]),
-                "angle [deg]": known(worst.angle),
-                "time [s]": known(worst.time),
-                "nature": self.nature_text(peak.nature),
+                "farthest peak": peak.upper[0],
+                "peak reached": peak.reached[0],
+                "angle [deg]": worst.angle,
+                "time [s]": worst.time,
+                "nature": peak.nature,
             }
-            rows.append(row)
-        return rows
 
     def words(self) -> str:
         """Return a sentence on what the angle is."""

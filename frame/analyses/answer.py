@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 Record = dict[str, str | float | None]
 """A row of numbers in SI units and of texts, by the titles of the columns; None where unknown."""
+Row = Mapping[str, str | float | Nature | None]
+"""A row as an analysis states it: guarantees are no texts yet, and unknown numbers not finite."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -30,7 +32,8 @@ class Answer(ABC):
     """Result of an analysis, which can be printed, tabulated and written to files.
 
     The class attributes are `key`, the name of the section of a case file that asks for the
-    analysis, and `title`, the question that it answers.
+    analysis, and `title`, the question that it answers. A column stands in one row of texts or of
+    numbers alone; tables, files and datasets are made from these.
 
     Args:
         encloses: Name of the set of inputs, such as "the learned set", that the box of the α-cuts
@@ -43,12 +46,29 @@ class Answer(ABC):
     encloses: str = ""
 
     @abstractmethod
-    def table(self) -> Table:
-        """Return a table of texts; its first columns are the subject, the result, its guarantee."""
+    def text_rows(self) -> Iterator[Row]:
+        """Yield the rows of `table`; first come the subject, the result and its guarantee."""
 
     @abstractmethod
+    def number_rows(self) -> Iterator[Row]:
+        """Yield the rows of `records`, numbers in SI units; all rows have the same columns."""
+
+    def table(self) -> Table:
+        """Return the rows of `text_rows` as a table of texts."""
+        return table_of([dict(self._stated(row)) for row in self.text_rows()])
+
     def records(self) -> list[Record]:
-        """Return rows of numbers in SI units; all rows have the same columns."""
+        """Return the rows of `number_rows`, with None for numbers that are not finite."""
+        return self.known_records(self.number_rows())
+
+    def known_records(self, rows: Iterable[Row]) -> list[Record]:
+        """Return rows with guarantees as texts, and None for numbers that are not finite."""
+        return [{title: _known(x) for title, x in self._stated(row)} for row in rows]
+
+    def _stated(self, row: Row) -> Iterator[tuple[str, Any]]:
+        """Yield title and value of each column of a row, guarantees as texts."""
+        for title, value in row.items():
+            yield title, self.nature_text(value) if isinstance(value, Nature) else value
 
     @abstractmethod
     def words(self) -> str:
@@ -138,9 +158,11 @@ def enclosing_box_words(encloses: str) -> str:
 
 def table_of(rows: Sequence[Mapping[str, str]]) -> Table:
     """Return a table whose rows are given by the titles of the columns, the same in each row."""
-    return Table(tuple(rows[0]), [tuple(row.values()) for row in rows])
+    return Table(tuple(rows[0]) if rows else (), [tuple(row.values()) for row in rows])
 
 
-def known(value: float) -> float | None:
-    """Return a finite number as it is, and None for one that is infinite or NaN."""
+def _known(value: str | float | None) -> str | float | None:
+    """Return a finite number as a float, None for one that is not, and a text as it is."""
+    if value is None or isinstance(value, str):
+        return value
     return float(value) if isfinite(value) else None

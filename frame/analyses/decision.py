@@ -9,7 +9,7 @@ all higher ones; an attained peak above the limit proves that an exceedance is p
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import floor, log10
 
@@ -17,8 +17,9 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import require_choice
-from alphacut.base.number_text import MINUS, ShownUnit, Table, engineering, percent_text
-from alphacut.frame.analyses.answer import Answer, Record, known, table_of
+from alphacut.base.number_text import MINUS, ShownUnit, engineering, percent_text
+from alphacut.base.progress_bar import Progress
+from alphacut.frame.analyses.answer import Answer, Row
 from alphacut.frame.analyses.limits import (
     ANY,
     Limit,
@@ -28,6 +29,7 @@ from alphacut.frame.analyses.limits import (
     stated_units,
 )
 from alphacut.frame.analyses.peaks import Peak, Peaks, peaks
+from alphacut.frame.analyses.question import Asked, Question
 from alphacut.frame.analyses.suites import SuitePeaks
 from alphacut.frame.result import Envelope
 from alphacut.frame.structures.quantities import Output
@@ -140,6 +142,27 @@ class LimitDecision(LimitResult):
         return self.text_of_value(rounded(factor * value, side, nature) / factor)
 
 
+@dataclass(frozen=True)
+class DecisionQuestion(Question):
+    """Possibility and necessity that limits are exceeded.
+
+    Args:
+        limits: Limits, of the largest peak over the records of a suite or of the mean over them.
+    """
+
+    reads_peaks = True
+    records = "allowed"
+    limits: tuple[Limit, ...]
+
+    def answer(self, asked: Asked, progress: Progress) -> Decision:
+        """Return the verdicts, which follow from the peaks alone."""
+        found = asked.suite or asked.peaks
+        assert found is not None  # of a question that reads peaks
+        # Units are given, since peaks know the names of outputs and inputs alone.
+        units = {limit.output: asked.model.unit_of(limit.output) for limit in self.limits}
+        return decide(found, self.limits, units=units, input_units=asked.input_units)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Decision(Answer):
     """Possibility and necessity that limits are exceeded.
@@ -164,12 +187,12 @@ class Decision(Answer):
         """Return the verdict on each limit in words."""
         return {limit.words: limit.verdict_words for limit in self.limits.values()}
 
-    def table(self) -> Table:
-        """Return a row for each limit; margin, bound, attained peak and gap are of the lowest α."""
-        return table_of([self._texts(part) for part in self.limits.values()])
+    def text_rows(self) -> Iterator[Row]:
+        """Yield a row for each limit; margin, bound, attained peak and gap are of the lowest α."""
+        yield from map(self._texts, self.limits.values())
 
-    def _texts(self, part: LimitDecision) -> dict[str, str]:
-        """Return the texts of one row of the table by the titles of the columns.
+    def _texts(self, part: LimitDecision) -> Row:
+        """Return one row of the table by the titles of the columns.
 
         Margin, bound, attained peak and gap are those of the lowest level. The gap is the distance
         of bound and attained peak over the bound; it is empty where it is unknown or the bound is
@@ -196,7 +219,7 @@ class Decision(Answer):
         return {
             "limit": part.words,
             "verdict": part.verdict_and_motion,
-            "nature": self.nature_text(part.nature),
+            "nature": part.nature,
             "possibility": degree_text(part.possibility),
             "necessity": degree_text(part.necessity),
             "least margin": part.text_of(float(part.margin.lower[0]), "lower", part.nature),
@@ -205,31 +228,29 @@ class Decision(Answer):
             "gap": gap,
         }
 
-    def records(self) -> list[Record]:
-        """Return a row of numbers for each limit, and last for the event that any is exceeded.
+    def number_rows(self) -> Iterator[Row]:
+        """Yield a row of numbers for each limit, and last for the event that any is exceeded.
 
         The first columns are name, SI unit and value of the limit. Then follow the verdict, the
         lowest computed level α and the guarantee; both bounds of the degrees to which exceeding the
         limit is possible and necessary; and on the lowest level the smallest margin, the bound of
-        the peak and its attained value, in SI units, with None for values that are not known. The
-        margin of an event is a fraction of the limits.
+        the peak and its attained value, in SI units. The margin of an event is a fraction of the
+        limits.
         """
-        return [
-            {
+        for name, part in self.limits.items():
+            yield {
                 **part.columns(name),
                 "verdict": part.verdict,
                 "from α": part.from_level,
-                "nature": self.nature_text(part.nature),
+                "nature": part.nature,
                 "least possibility": part.possibility[0],
                 "greatest possibility": part.possibility[1],
                 "least necessity": part.necessity[0],
                 "greatest necessity": part.necessity[1],
-                "least margin": known(part.margin.lower[0]),
-                "bound of peak": known(part.peak_bound),
-                "peak reached": known(part.attained_peak),
+                "least margin": part.margin.lower[0],
+                "bound of peak": part.peak_bound,
+                "peak reached": part.attained_peak,
             }
-            for name, part in self.limits.items()
-        ]
 
     def words(self) -> str:
         """Return sentences that explain the verdicts."""

@@ -54,7 +54,7 @@ def observed_accelerations(
         RefusedError: It is not linear, not at rest, under forces, or not moved by a record from
             t = 0 on; or an output is no absolute acceleration.
     """
-    linear = _require_linear(structure)
+    linear = require_linear(structure)
     grounds = grounds_of(linear)
     for ground in grounds:
         is_plain = not (ground.start or ground.frequency or ground.is_held)
@@ -97,10 +97,10 @@ def moved_by(
     """
     if not motions:
         return [structure]
-    return [_require_linear(structure).moved_by(*grounds) for grounds in motions]
+    return [require_linear(structure).moved_by(*grounds) for grounds in motions]
 
 
-def _require_linear(structure: StructureModel) -> LinearSystem:
+def require_linear(structure: StructureModel) -> LinearSystem:
     """Return a structure, or raise RefusedError if it is not linear."""
     is_linear = structure.dynamics is Dynamics.LINEAR and isinstance(structure, LinearSystem)
     allowed = "a linear structure, whose columns do not yield"

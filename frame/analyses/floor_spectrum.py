@@ -2,33 +2,110 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number, require
-from alphacut.base.number_text import Table, engineering, number_text, rounded_ends
+from alphacut.base.number_text import engineering, number_text, rounded_ends
 from alphacut.base.progress_bar import Progress, nth_subprogress, progress_reporter
-from alphacut.frame.analyses.answer import Answer, Record, known, table_of
+from alphacut.base.quantity import Quantity
+from alphacut.frame.analyses.answer import Answer, Row
 from alphacut.frame.analyses.floor_oscillators import (
     FloorOscillators,
     FloorValues,
     mean_values,
     moved_by,
     observed_accelerations,
+    require_linear,
 )
 from alphacut.frame.analyses.peaks import PEAK_ERROR
+from alphacut.frame.analyses.question import Asked, Question
 from alphacut.frame.analyses.suites import record_names
 from alphacut.frame.boxes import ALPHA, boxes
 from alphacut.frame.dynamics.flow import time_nodes
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.spectra.response_spectrum import checked_periods
+from alphacut.frame.structures.linear import frequencies
 from alphacut.frame.structures.model import StructureModel
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Nature
+
+
+@dataclass(frozen=True)
+class FloorQuestion(Question):
+    """Spectra of light oscillators on floors, over the α-cuts of [envelope], with its time step.
+
+    With [records] they are means over the records.
+
+    Args:
+        outputs: absolute accelerations of the floors, as a4 of [frame]
+        damping: damping ratio of the oscillators; of several, as ["2 %", "5 %"], the figure shows
+            all
+        shortest: shortest period; short ones take long
+        longest: longest period
+        count: number of periods in geometric progression, beside 0, the floor's largest
+            acceleration, and the nominal periods of the structure in this range
+        periods: periods in place of these, as ["0 s", "0.2 s"]
+    """
+
+    records = "allowed"
+    all_angles = False
+    replaced: ClassVar = {"periods": ("shortest", "longest", "count")}
+    outputs: tuple[str, ...]
+    damping: tuple[Annotated[float, Quantity(minimum=0, maximum=0.999)], ...] = (0.05,)
+    shortest: Annotated[float, Quantity("s", above=0)] = 0.05
+    longest: Annotated[float, Quantity("s", above=0)] = 2.0
+    count: Annotated[int, Quantity(minimum=2, maximum=500, is_integer=True)] = 20
+    periods: tuple[Annotated[float, Quantity("s", minimum=0)], ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse periods that are too short or given twice, and a range without width."""
+        checked_periods(self.periods)
+        checked_periods(self.shortest, "shortest")
+        for name in ("periods", "damping"):
+            values = getattr(self, name)
+            text = ", ".join(f"{value:g}" for value in values)
+            require(len(set(values)) == len(values), name, text, "each once")
+        allowed = f"more than shortest, {self.shortest:g} s"
+        require(self.shortest < self.longest, "longest", f"{self.longest:g} s", allowed)
+
+    def require(self, model: StructureModel, components: int) -> None:
+        """Refuse a structure without floor spectra, and outputs that are no accelerations."""
+        motions = [(Accelerogram(1.0, np.zeros(2)),) * components] if components else []
+        (moved,) = moved_by(model, motions)
+        observed_accelerations(moved, self.outputs, {})
+
+    def periods_of(self, model: StructureModel) -> Array:
+        """Return the periods in s, shape (periods,), and nominal ones of the structure in a range.
+
+        Spectra are largest about these.
+        """
+        if self.periods:
+            return np.array(self.periods)
+        stated = np.append(0.0, np.geomspace(self.shortest, self.longest, self.count))
+        own = 2 * np.pi / frequencies(require_linear(model))
+        return np.union1d(stated, own[(own >= self.shortest) & (own <= self.longest)])
+
+    def answer(self, asked: Asked, progress: Progress) -> FloorSpectrum:
+        """Return the bounds; with records, for the duration of the longest response."""
+        durations = [record.duration for record in asked.records]
+        return floor_spectrum(
+            asked.model,
+            asked.inputs,
+            self.outputs,
+            self.periods_of(asked.model),
+            self.damping,
+            duration=max(durations, default=asked.duration),
+            step=asked.step,
+            alpha=asked.alpha,
+            records=[record.components for record in asked.records],
+            progress=progress,
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -64,13 +141,12 @@ class FloorSpectrum(Answer):
     unproved: str = ""
     suite: tuple[str, ...] = ()
 
-    def table(self) -> Table:
-        """Return a table of texts with a row for each curve and period, at the lowest level.
+    def text_rows(self) -> Iterator[Row]:
+        """Yield a row for each curve and period, at the lowest level.
 
         The columns are output with period, and with the damping ratio if there are several, the
         bound, its guarantee, the attained value, and the value at the nominal inputs.
         """
-        rows = []
         is_one = len(set(self.damping)) == 1
         for k, name in enumerate(self.outputs):
             for p, period in enumerate(map(float, self.periods)):
@@ -78,10 +154,10 @@ class FloorSpectrum(Answer):
                 _, bound = rounded_ends(0.0, float(self.bound[0, k, p]), nature)
                 attained = float(self.attained[0, k, p])
                 damping = "" if is_one else f", ζ = {self.damping[k]:.3g}"
-                row = {
+                row: dict[str, str | Nature] = {
                     "spectrum of": f"{name}, T = {period:.4g} s{damping}",
                     f"Sa at α = {self.alpha[0]:g}": "not bounded",
-                    "nature": self.nature_text(nature),
+                    "nature": nature,
                     "reached": "not known",
                     "nominal": engineering(float(self.nominal[k, p]), "m/s^2"),
                 }
@@ -89,8 +165,7 @@ class FloorSpectrum(Answer):
                     row[f"Sa at α = {self.alpha[0]:g}"] = f"≤ {number_text(bound)} m/s^2"
                 if np.isfinite(attained):
                     row["reached"] = engineering(attained, "m/s^2")
-                rows.append(row)
-        return table_of(rows)
+                yield row
 
     @property
     def largest_rows(self) -> list[int]:
@@ -98,24 +173,21 @@ class FloorSpectrum(Answer):
         count = len(self.periods)
         return [k * count + int(self.bound[0, k].argmax()) for k in range(len(self.outputs))]
 
-    def records(self) -> list[Record]:
-        """Return a row for each curve, level and period, in s and m/s²; None where unknown."""
-        rows: list[Record] = []
+    def number_rows(self) -> Iterator[Row]:
+        """Yield a row for each curve, level and period, in s and m/s²."""
         for k, name in enumerate(self.outputs):
-            for j, level in enumerate(map(float, self.alpha)):
-                for p, period in enumerate(map(float, self.periods)):
-                    row: Record = {
+            for j, level in enumerate(self.alpha):
+                for p, period in enumerate(self.periods):
+                    yield {
                         "output": name,
                         "damping ratio": self.damping[k],
                         "alpha": level,
                         "period [s]": period,
-                        "nominal [m/s^2]": float(self.nominal[k, p]),
-                        "attained [m/s^2]": known(self.attained[j, k, p]),
-                        "bound [m/s^2]": known(self.bound[j, k, p]),
+                        "nominal [m/s^2]": self.nominal[k, p],
+                        "attained [m/s^2]": self.attained[j, k, p],
+                        "bound [m/s^2]": self.bound[j, k, p],
                         "nature": str(self.natures[k][p]),
                     }
-                    rows.append(row)
-        return rows
 
     def words(self) -> str:
         """Return sentences on the oscillators, the curves, and what is not proved."""

@@ -19,17 +19,19 @@ fit, are written by `alphacut/report/tables.py`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Annotated, Literal
 
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number, require, require_choice
-from alphacut.base.number_text import STANDARD_GRAVITY, ShownUnit, Table, engineering, range_text
+from alphacut.base.number_text import STANDARD_GRAVITY, ShownUnit, engineering, range_text
 from alphacut.base.progress_bar import Progress, nth_subprogress
-from alphacut.frame.analyses.answer import Answer, Record, known, records_csv, table_of
+from alphacut.base.quantity import Quantity
+from alphacut.frame.analyses.answer import Answer, Record, Row, records_csv
 from alphacut.frame.analyses.damage_states import (
     LognormalFit,
     fits_between,
@@ -55,6 +57,7 @@ from alphacut.frame.analyses.limits import (
 )
 from alphacut.frame.analyses.peaks import Peak
 from alphacut.frame.analyses.probability import CONFIDENCE, clopper_pearson
+from alphacut.frame.analyses.question import Asked, Question
 from alphacut.frame.analyses.suites import (
     MEASURES,
     ScaledRecord,
@@ -68,6 +71,7 @@ from alphacut.frame.analyses.suites import (
 from alphacut.frame.boxes import ALPHA, boxes
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.storey import StoreyFrame, yields
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.result import Ends, Nature
@@ -414,6 +418,83 @@ class LimitFragility(LimitResult):
         return curves
 
 
+@dataclass(frozen=True)
+class FragilityQuestion(Question):
+    """Fraction of the records under which limits are exceeded, over a measure of records.
+
+    Args:
+        limits: limits of outputs, as of [decision]; or states
+        states: in place of limits: those of damage states by name, from the slightest on, as
+            'slight = ["drift <= 0.5 %"]'; a state begins with the first of its limits in any storey
+        measure: measure of a record; Sa(T1) is the pseudo-acceleration `ω² max |u|` at the nominal
+            structure's first period, with its own damping ratio (not 5 %); of two components
+            RotD50(T1) is its median over all directions, and RotD100(T1) the largest one
+        independent: whether records count as independent draws: 95 % limits
+        most: of columns that yield: largest measure tried, as a multiple of the one at which the
+            nominal structure would reach all limits under all records if it were elastic
+    """
+
+    reads_peaks = True
+    records = "needed"
+    of_yielding = ("most",)
+    limits: tuple[Limit, ...] = ()
+    states: dict[str, tuple[Limit, ...]] = field(default_factory=dict)
+    measure: Literal["Sa(T1)", "PGA", "scale", "RotD50(T1)", "RotD100(T1)"] = "Sa(T1)"
+    independent: bool = False
+    most: Annotated[float, Quantity(above=0, maximum=100)] = 2.0
+
+    def __post_init__(self) -> None:
+        """Refuse limits beside states, and neither of them."""
+        value = "beside states" if self.limits else None
+        is_one = bool(self.limits) != bool(self.states)
+        require(is_one, "limits", value, "limits, or the limits of states")
+
+    @property
+    def named_limits(self) -> dict[str, Limit]:
+        """The limits, or those of the states with their states as events, by name."""
+        return limits_by_name(limits_of_states(self.states) if self.states else self.limits, ())
+
+    def require(self, model: StructureModel, components: int) -> None:
+        """Refuse a structure, limits and a measure of which no fragility can be computed."""
+        require_fragile(model, list(self.named_limits.values()))
+        is_measured = components > 1 or not self.measure.startswith("RotD")
+        require(is_measured, "measure", self.measure, "beside records of two components")
+
+    def analyses(self, asked: Asked) -> dict[str, IncrementalAnalysis]:
+        """Return the incremental dynamic analysis of a frame that yields, by record."""
+        assert isinstance(asked.model, StoreyFrame)
+        return incremental_analyses(
+            asked.model,
+            asked.inputs,
+            asked.records,
+            self.named_limits,
+            intensity=self.measure,
+            most=self.most,
+            step=asked.step,
+            alpha=asked.alpha,
+        )
+
+    def answer(self, asked: Asked, progress: Progress) -> Fragility:
+        """Return the fragility, for which all but the nominal responses are known."""
+        model = asked.model
+        assert isinstance(model, LinearSystem)  # as `require` asks for
+        limits = self.named_limits
+        found = fragility_of(
+            model,
+            limits,
+            intensity=self.measure,
+            independent=self.independent,
+            alpha=asked.alpha,
+            suite=asked.suite,
+            increments=asked.increments,
+            states=tuple(self.states),
+        )
+        step = asked.step
+        return with_nominal(
+            found, model, asked.inputs, asked.records, limits, step=step, most=self.most
+        )
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Fragility(Answer):
     """Fraction of the records of a suite under which limits are exceeded, over their intensity.
@@ -465,37 +546,38 @@ class Fragility(Answer):
         """Return sets and curves of a frame that yields, and Pelicun's table of damage states."""
         found: dict[str, list[Record]] = {}
         if self.increments:
-            found = {"fragility_sets": self.crossings(), "fragility_curves": self.curves()}
+            rows = {"fragility_sets": self.crossings(), "fragility_curves": self.curves()}
+            found = {name: self.known_records(x) for name, x in rows.items()}
         if self.has_pelicun_table:
             found["pelicun"] = self.pelicun()
         return found
 
-    def table(self) -> Table:
-        """Return a table of texts with a row for each limit and for each event of several limits.
+    def text_rows(self) -> Iterator[Row]:
+        """Yield a row for each limit and for each event of several limits.
 
         The columns are the limit; the median of the critical measures at the lowest level, for a
         frame that yields with the ranges over the records; the guarantee; median and dispersion of
         the lognormal fit at the lowest level; and the median at the highest level. Of damage states
         there are rows of the states alone, with the fit beside the median and at both levels.
         """
-        rows = []
         for part in self.limits.values():
             if self.states and part.event_name:
                 continue
-            row = {
+            median = self._median_text(part, 0)
+            if self.states:
+                median += f"; lognormal {self._fit_text(part, 0)}"
+            elif self.increments:
+                median += f"; over the records {self._crossings_text(part)}"
+            row: dict[str, str | Nature] = {
                 "limit": part.words,
-                "median at the lowest α": self._median_text(part, 0),
-                "nature": self.nature_text(part.nature),
+                "median at the lowest α": median,
+                "nature": part.nature,
                 "lognormal fit at the lowest α": self._fit_text(part, 0),
                 "median at the highest α": self._median_text(part, -1),
             }
             if self.states:
-                row["median at the lowest α"] += f"; lognormal {self._fit_text(part, 0)}"
                 row["lognormal fit at the highest α"] = self._fit_text(part, -1)
-            elif self.increments:
-                row["median at the lowest α"] += f"; over the records {self._crossings_text(part)}"
-            rows.append(row)
-        return table_of(rows)
+            yield row
 
     def _median_text(self, part: LimitFragility, level: int) -> str:
         """Return the bounds of the median measure as text; accelerations are given in g, too.
@@ -542,14 +624,17 @@ class Fragility(Answer):
         )
 
     def records(self) -> list[Record]:
-        """Return a row of numbers for each limit or event and each level.
+        """Return the rows of `number_rows`, in which unknown bounds stay infinite."""
+        return [dict(self._stated(row)) for row in self.number_rows()]
+
+    def number_rows(self) -> Iterator[Row]:
+        """Yield a row of numbers for each limit or event and each level.
 
         The columns are name, unit and value of the limit, α, the lower ("least") and the upper
         ("greatest") bound of the median, of the dispersion and of the median of the lognormal fit
         over all structures of the cut, and the guarantee. The dispersion of a single record is
         None; unknown bounds are infinite.
         """
-        rows = []
         for name, part in self.limits.items():
             numbers = {
                 f"median {self._measure_title}": part.median,
@@ -557,14 +642,13 @@ class Fragility(Answer):
                 f"lognormal median {self._measure_title}": part.lognormal_median,
             }
             for level, alpha in enumerate(self.alpha):
-                row = part.columns(name) | {"α": float(alpha)}
+                row: dict[str, str | float | Nature | None] = {**part.columns(name), "α": alpha}
                 for title, ends in numbers.items():
                     row |= {f"least {title}": None, f"greatest {title}": None}
                     if ends is not None:
                         row[f"least {title}"] = float(ends.lower[level])
                         row[f"greatest {title}"] = float(ends.upper[level])
-                rows.append(row | {"nature": self.nature_text(part.nature)})
-        return rows
+                yield row | {"nature": part.nature}
 
     @property
     def _measure_title(self) -> str:
@@ -576,35 +660,30 @@ class Fragility(Answer):
         """Unit of the measure in the title of a column."""
         return f" [{self.unit}]" if self.unit else ""
 
-    def crossings(self) -> list[Record]:
-        """Return a row for each limit or event, record and level of a frame that yields.
+    def crossings(self) -> Iterator[Row]:
+        """Yield a row for each limit or event, record and level of a frame that yields.
 
         "first crossing" is the smallest measure tried at which some structure exceeds the limit,
-        and "last non-exceedance" the largest one at which some structure keeps it; None for what
+        and "last non-exceedance" the largest one at which some structure keeps it; infinite if it
         lies beyond the largest measure tried. The measures at which some structure and at which
         all structures that were moved exceed the limit follow as texts of intervals. A linear
         structure has no rows.
         """
         unit = self._unit_title
-        rows: list[Record] = []
         for name, part in self.limits.items():
             for column, (record, increments) in enumerate(self.increments.items()):
                 measure = increments.measure
                 greatest, least = increments.demands[name]  # (levels, measures) each
                 for level, alpha in enumerate(self.alpha):
-                    row: Record = {
+                    yield {
                         "limit": part.words,
                         "record": record,
-                        "α": float(alpha),
-                        f"first crossing{unit}": known(part.critical.low_reached[level, column]),
-                        f"last non-exceedance{unit}": known(
-                            part.critical.high_reached[level, column]
-                        ),
+                        "α": alpha,
+                        f"first crossing{unit}": part.critical.low_reached[level, column],
+                        f"last non-exceedance{unit}": part.critical.high_reached[level, column],
                         f"exceeded by some{unit}": _set_text(measure, greatest[level]),
                         f"exceeded by all found{unit}": _set_text(measure, least[level]),
                     }
-                    rows.append(row)
-        return rows
 
     @property
     def limits_by_demand(self) -> dict[str, list[str]]:
@@ -631,23 +710,21 @@ class Fragility(Answer):
         """
         return self.limits[name].limit * self.increments[record].demands[name]
 
-    def curves(self) -> list[Record]:
-        """Return a row for each limited peak, record, level and measure of a frame that yields.
+    def curves(self) -> Iterator[Row]:
+        """Yield a row for each limited peak, record, level and measure of a frame that yields.
 
         The columns are the name and the SI unit of the peak, the record, α, the intensity measure,
         and the smallest ("least") and the largest ("greatest") peak of the structures that were
-        moved, None for a collapse. Several limits of one peak give its rows once. A linear
+        moved, infinite for a collapse. Several limits of one peak give its rows once. A linear
         structure has no rows.
         """
-        rows: list[Record] = []
         for peak, names in self.limits_by_demand.items():
             for record, increments in self.increments.items():
-                head: Record = {"peak": peak, "unit": self.limits[names[0]].unit, "record": record}
+                head: Row = {"peak": peak, "unit": self.limits[names[0]].unit, "record": record}
                 # All limits of a peak have the same curve.
                 demands = self.demand_curve(names[0], record)
                 measure = {self._measure_title: increments.measure}
-                rows += curve_rows(head, self.alpha, measure=measure, demands=demands)
-        return rows
+                yield from curve_rows(head, self.alpha, measure=measure, demands=demands)
 
     @property
     def has_pelicun_table(self) -> bool:

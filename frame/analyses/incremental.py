@@ -11,7 +11,7 @@ because they belong to the same responses.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -19,9 +19,9 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import checked_number, require
-from alphacut.base.number_text import Table, range_text
+from alphacut.base.number_text import range_text
 from alphacut.base.progress_bar import Progress
-from alphacut.frame.analyses.answer import Answer, Record, known, table_of
+from alphacut.frame.analyses.answer import Answer, Row
 from alphacut.frame.analyses.suites import scaled_records
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.dynamics.yielding import YieldingFlow
@@ -390,13 +390,12 @@ class ScaledPeaks(Answer):
     peaks: dict[str, dict[str, Array]]
     units: dict[str, str]
 
-    def table(self) -> Table:
-        """Return a table of texts with a row for each record.
+    def text_rows(self) -> Iterator[Row]:
+        """Yield a row for each record.
 
         The columns are the name of the record; for each output the range from the smallest to the
         largest peak that was found at the largest scale on the lowest level; and the guarantee.
         """
-        rows = []
         for record, by_output in self.peaks.items():
             texts = []
             for output, (largest, smallest) in by_output.items():
@@ -406,21 +405,19 @@ class ScaledPeaks(Answer):
                 # An output without a unit, such as a ductility, leaves a blank.
                 texts.append(f"{output} {ends} {self.units[output]}".strip())
             title = f"peaks at scale {self.scales[-1]:g}"
-            rows.append({"record": record, title: "; ".join(texts), "nature": Nature.ATTAINED})
-        return table_of(rows)
+            yield {"record": record, title: "; ".join(texts), "nature": str(Nature.ATTAINED)}
 
-    def records(self) -> list[Record]:
-        """Return a row of numbers for each record, output, level and scale, in this order.
+    def number_rows(self) -> Iterator[Row]:
+        """Yield a row of numbers for each record, output, level and scale, in this order.
 
         The columns are record, output, its SI unit, α, scale, and the smallest ("least") and
-        largest ("greatest") peak that was found, None for a collapse.
+        largest ("greatest") peak that was found, infinite for a collapse.
         """
-        rows: list[Record] = []
         for record, by_output in self.peaks.items():
             for output, peaks in by_output.items():
-                head: Record = {"record": record, "output": output, "unit": self.units[output]}
-                rows += curve_rows(head, self.alpha, measure={"scale": self.scales}, demands=peaks)
-        return rows
+                head: Row = {"record": record, "output": output, "unit": self.units[output]}
+                measure = {"scale": self.scales}
+                yield from curve_rows(head, self.alpha, measure=measure, demands=peaks)
 
     def words(self) -> str:
         """Return a sentence on what the peaks belong to."""
@@ -431,12 +428,12 @@ class ScaledPeaks(Answer):
 
 
 def curve_rows(
-    head: Record, alpha: Array, *, measure: Mapping[str, Array], demands: Array
-) -> list[Record]:
-    """Return rows of the largest and smallest peak over the measure of a record.
+    head: Row, alpha: Array, *, measure: Mapping[str, Array], demands: Array
+) -> Iterator[Row]:
+    """Yield rows of the largest and smallest peak over the measure of a record.
 
     There is a row for each level and measure, in this order. After the given columns it has α, the
-    measure, and the smallest ("least") and the largest peak ("greatest"), None where not finite.
+    measure, and the smallest ("least") and the largest peak ("greatest").
 
     Args:
         head: First columns of each row.
@@ -449,12 +446,14 @@ def curve_rows(
     """
     largest, smallest = demands
     ((title, measures),) = measure.items()
-    rows = []
     for level, k in np.ndindex(largest.shape):
-        row: Record = {"α": float(alpha[level]), title: float(measures[k])}
-        row |= {"least": known(smallest[level, k]), "greatest": known(largest[level, k])}
-        rows.append(head | row)
-    return rows
+        yield {
+            **head,
+            "α": alpha[level],
+            title: measures[k],
+            "least": smallest[level, k],
+            "greatest": largest[level, k],
+        }
 
 
 def incremental(

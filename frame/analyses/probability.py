@@ -10,18 +10,19 @@ contain their probabilities at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import checked_number, require, require_choice
-from alphacut.base.number_text import MINUS, ShownUnit, Table, range_text
+from alphacut.base.number_text import MINUS, ShownUnit, range_text
 from alphacut.base.progress_bar import Progress
-from alphacut.frame.analyses.answer import Answer, Record, table_of
+from alphacut.base.quantity import Quantity
+from alphacut.frame.analyses.answer import Answer, Row
 from alphacut.frame.analyses.limits import (
     ANY,
     Limit,
@@ -30,6 +31,7 @@ from alphacut.frame.analyses.limits import (
     limits_by_name,
     stated_units,
 )
+from alphacut.frame.analyses.question import Asked, Question
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.dynamics.nonlinear import make_flow
@@ -89,6 +91,41 @@ class LimitProbability(LimitResult):
         return range_text(float(self.lower[level]), float(self.upper[level]), self.nature, 3)
 
 
+@dataclass(frozen=True)
+class ProbabilityQuestion(Question):
+    """Fuzzy probability that limits are exceeded; inputs that are not random stay fuzzy.
+
+    Args:
+        limits: Limits of magnitudes, one for each output, in SI units.
+        random: inputs that are random, with the shape of their membership
+        samples: random draws at each fuzzy point
+    """
+
+    needs_magnitudes = True
+    limits: tuple[Limit, ...]
+    random: tuple[str, ...] = ()
+    # The error of a probability p falls as √(p (1 − p)/samples): 200 give 0.035 at p = 1/2. Each
+    # sample is a response at each fuzzy point, so that more take long.
+    samples: Annotated[int, Quantity(minimum=1, maximum=10_000, is_integer=True)] = 200
+
+    def answer(self, asked: Asked, progress: Progress) -> Probability:
+        """Return bounds of the probabilities, from samples that are computed anew."""
+        members = [member for name in self.random for member in asked.model.group(name)]
+        random = {x: asked.numbers[x] for x in members if asked.numbers[x].support.width > 0}
+        return probability(
+            asked.model,
+            # An input is random or fuzzy, not both.
+            {name: number for name, number in asked.inputs.items() if name not in random},
+            self.limits,
+            random,
+            duration=asked.duration,
+            step=asked.step,
+            alpha=asked.alpha,
+            samples=self.samples,
+            progress=progress,
+        )
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Probability(Answer):
     """Fuzzy probability that limits are exceeded.
@@ -117,51 +154,46 @@ class Probability(Answer):
         """Units in which the limits are stated, by output."""
         return stated_units(self.events.values())
 
-    def table(self) -> Table:
-        """Return a table of texts with a row for each limit, and last for any of them.
+    def text_rows(self) -> Iterator[Row]:
+        """Yield a row for each limit, and last for any of them.
 
         The columns are the event that the limit is exceeded; bounds of its probability at the
         lowest level; the guarantee; the bounds at the highest level; the confidence interval at
         the lowest level; and what peaks between the time nodes may add, the largest over levels.
         """
-        rows = []
         for part in self.events.values():
             low = float(part.interval.lower[0])
             high = float(part.interval.upper[0])
             # The interval is rounded outwards.
             interval = range_text(low, high, Nature.GUARANTEED, 3)
-            row = {
+            yield {
                 "limit": part.event,
                 "at the lowest α": part.bounds_text(0),
-                "nature": self.nature_text(part.nature),
+                "nature": part.nature,
                 "at the highest α": part.bounds_text(-1),
                 f"{CONFIDENCE:.0%} interval at the lowest α": interval,
                 "between nodes": f"{part.error.max():.2g}".replace("-", MINUS),
             }
-            rows.append(row)
-        return table_of(rows)
 
-    def records(self) -> list[Record]:
-        """Return a row of numbers for each limit and level, and last for the event of any limit.
+    def number_rows(self) -> Iterator[Row]:
+        """Yield a row of numbers for each limit and level, and last for the event of any limit.
 
         The columns are name, unit and value of the limit, α, the smallest and the largest
         probability of the points tried, the guarantee, both ends of the confidence interval, and
         what peaks between the time nodes may add to a probability.
         """
-        rows = []
         for name, part in self.events.items():
             for level, alpha in enumerate(self.alpha):
-                row: Record = {
-                    "α": float(alpha),
-                    "at least": float(part.lower[level]),
-                    "at most": float(part.upper[level]),
-                    "nature": self.nature_text(part.nature),
-                    f"{CONFIDENCE:.0%} interval from": float(part.interval.lower[level]),
-                    f"{CONFIDENCE:.0%} interval to": float(part.interval.upper[level]),
-                    "between nodes": float(part.error[level]),
+                yield {
+                    **part.columns(name),
+                    "α": alpha,
+                    "at least": part.lower[level],
+                    "at most": part.upper[level],
+                    "nature": part.nature,
+                    f"{CONFIDENCE:.0%} interval from": part.interval.lower[level],
+                    f"{CONFIDENCE:.0%} interval to": part.interval.upper[level],
+                    "between nodes": part.error[level],
                 }
-                rows.append(part.columns(name) | row)
-        return rows
 
     def words(self) -> str:
         """Return sentences on how the probability was computed, and on its interval."""

@@ -7,15 +7,15 @@ needed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.number_text import Table, percent_text
-from alphacut.frame.analyses.answer import Answer, Record, table_of
+from alphacut.base.number_text import percent_text
+from alphacut.frame.analyses.answer import Answer, Row
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.model import StructureModel
@@ -38,30 +38,25 @@ class Sensitivity(Answer):
     title = "What drives the width?"
     shares: dict[str, dict[str, float]]
 
-    def table(self) -> Table:
-        """Return a table of texts with a row for each result and input.
+    def text_rows(self) -> Iterator[Row]:
+        """Yield a row for each result and input.
 
         A row says by which percentage fixing the input narrows the result. The inputs of a result
         stand in falling order of this effect.
         """
-        rows = [
-            {
-                "fixing": str(row["input"]),
-                "narrows": str(row["width of"]),
+        for row in self.number_rows():
+            yield {
+                "fixing": row["input"],
+                "narrows": row["width of"],
                 "nature": str(Nature.ATTAINED),
-                "by": percent_text(self.shares[str(row["width of"])][str(row["input"])]),
+                "by": percent_text(cast("float", row["share"])),
             }
-            for row in self.records()
-        ]
-        return table_of(rows)
 
-    def records(self) -> list[Record]:
-        """Return a row for each result and input, with the largest fraction of a result first."""
-        rows: list[Record] = []
+    def number_rows(self) -> Iterator[Row]:
+        """Yield a row for each result and input, with the largest fraction of a result first."""
         for result, fractions in self.shares.items():
             for name in sorted(fractions, key=lambda name: -fractions[name]):
-                rows.append({"width of": result, "input": name, "share": fractions[name]})
-        return rows
+                yield {"width of": result, "input": name, "share": fractions[name]}
 
     def words(self) -> str:
         """Return a sentence that defines the fractions."""

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number, require, require_choice
-from alphacut.base.number_text import Table
-from alphacut.frame.analyses.answer import Answer, Record
+from alphacut.frame.analyses.answer import Answer, Row
 from alphacut.frame.analyses.suites import nominal_mode, record_names
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.spectra.response_spectrum import response_spectrum
@@ -51,16 +50,13 @@ class ScaledSuite(Answer):
     spectra: Array
     suite: tuple[Accelerogram, ...]
 
-    def table(self) -> Table:
-        """Return `records` as texts; numbers have four digits."""
-        records = self.records()
-        rows = []
-        for name, *numbers in map(dict.values, records):
-            rows.append((str(name), *(f"{x:.4g}" for x in numbers)))
-        return Table(tuple(records[0]), rows)
+    def text_rows(self) -> Iterator[Row]:
+        """Yield `number_rows` with numbers of four digits."""
+        for row in self.number_rows():
+            yield {title: x if isinstance(x, str) else f"{x:.4g}" for title, x in row.items()}
 
-    def records(self) -> list[Record]:
-        """Return a row of numbers for each record, and one for the mean of factors and spectra.
+    def number_rows(self) -> Iterator[Row]:
+        """Yield a row of numbers for each record, and one for the mean of factors and spectra.
 
         The columns are the record, its factor, its largest ground acceleration, and its spectrum
         over the target: at T1, and the smallest and the largest ratio over the range of periods.
@@ -75,8 +71,8 @@ class ScaledSuite(Answer):
             "least": ratios.min(axis=1),
             "greatest": ratios.max(axis=1),
         }
-        names = enumerate([*self.factors, "mean"])
-        return [{"record": x} | {t: float(c[k]) for t, c in columns.items()} for k, x in names]
+        for k, name in enumerate([*self.factors, "mean"]):
+            yield {"record": name} | {title: column[k] for title, column in columns.items()}
 
     def words(self) -> str:
         """Return sentences on the target, what governs, and what the code asks for."""

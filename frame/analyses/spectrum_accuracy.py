@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import require
-from alphacut.base.number_text import MINUS, Table
+from alphacut.base.number_text import MINUS
 from alphacut.base.progress_bar import Progress, nth_subprogress
-from alphacut.frame.analyses.answer import Answer, Record, table_of
+from alphacut.frame.analyses.answer import Answer, Row
 from alphacut.frame.analyses.spectrum_response import SpectrumResponse
 from alphacut.frame.analyses.suites import GroundMotion, ScaledRecord, record_peaks, scaled_records
 from alphacut.frame.spectra.response_spectrum import response_spectrum
@@ -50,40 +50,34 @@ class SpectrumAccuracy(Answer):
         peaks = np.where(self.peaks > 0, self.peaks, np.nan)[..., ::-1]
         return np.asarray(self.combined[..., np.newaxis] / peaks - 1)
 
-    def table(self) -> Table:
-        """Return a row for each output: the range of its errors and where the extremes are."""
-        rows = []
+    def text_rows(self) -> Iterator[Row]:
+        """Yield a row for each output: the range of its errors and where the extremes are."""
         for k, name in enumerate(self.outputs):
             errors = self.errors[:, k]
             low = int(np.nanargmin(errors[:, 0]))
             high = int(np.nanargmax(errors[:, 1]))
-            row = {
+            yield {
                 "peak of": name,
                 "errs by": _range_text(errors),
-                "nature": self.nature_text(self.nature),
+                "nature": self.nature,
                 "lowest under": self.names[low],
                 "highest under": self.names[high],
             }
-            rows.append(row)
-        return table_of(rows)
 
-    def records(self) -> list[Record]:
-        """Return a row for each output and record: both peaks and the bounds of the error."""
-        rows: list[Record] = []
+    def number_rows(self) -> Iterator[Row]:
+        """Yield a row for each output and record: both peaks and the bounds of the error."""
         for k, (name, unit) in enumerate(zip(self.outputs, self.units, strict=True)):
             for r, record in enumerate(self.names):
-                row: Record = {
+                yield {
                     "output": name,
                     "unit": unit,
                     "record": record,
-                    "combined peak": float(self.combined[r, k]),
-                    "lower peak": float(self.peaks[r, k, 0]),
-                    "upper peak": float(self.peaks[r, k, 1]),
-                    "least error": float(self.errors[r, k, 0]),
-                    "greatest error": float(self.errors[r, k, 1]),
+                    "combined peak": self.combined[r, k],
+                    "lower peak": self.peaks[r, k, 0],
+                    "upper peak": self.peaks[r, k, 1],
+                    "least error": self.errors[r, k, 0],
+                    "greatest error": self.errors[r, k, 1],
                 }
-                rows.append(row)
-        return rows
 
     def words(self) -> str:
         """Return a sentence on the errors of all outputs."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,7 +11,7 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import FailedError, RefusedError, checked_number, require_choice
 from alphacut.base.number_text import Table, engineering, percent_text, range_text
-from alphacut.frame.analyses.answer import Answer, Record, known, table_of
+from alphacut.frame.analyses.answer import Answer, Row, table_of
 from alphacut.frame.analyses.peaks import Peak
 from alphacut.frame.bounds.spectrum_bounds import combined_bounds
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
@@ -138,13 +138,12 @@ class SpectrumResponse(Answer):
             rows.append(row)
         return table_of(rows)
 
-    def table(self) -> Table:
-        """Return a table of texts with a row for each output.
+    def text_rows(self) -> Iterator[Row]:
+        """Yield a row for each output.
 
         The columns are the output, the range of its combined peak at the lowest level, the
         guarantee of this range, its attained part, and the combined peak at the nominal inputs.
         """
-        rows = []
         for k, (name, unit) in enumerate(zip(self.outputs, self.units, strict=True)):
             low, high = self.attained[0, k].tolist()
             reached = range_text(low, high, Nature.ATTAINED)
@@ -154,36 +153,31 @@ class SpectrumResponse(Answer):
                 low, high = self.proved[0, k].tolist()
                 nature = Nature.GUARANTEED
                 text = range_text(low, high, nature)
-            row = {
+            yield {
                 "peak of": name,
                 f"at α = {self.alpha[0]:g}": f"{text} {unit}",
-                "nature": self.nature_text(nature),
+                "nature": nature,
                 "reached": f"{reached} {unit}",
                 "nominal": engineering(float(self.nominal[k]), unit),
             }
-            rows.append(row)
-        return table_of(rows)
 
-    def records(self) -> list[Record]:
-        """Return a row for each output and level, with guaranteed bounds and attained values.
+    def number_rows(self) -> Iterator[Row]:
+        """Yield a row for each output and level, with guaranteed bounds and attained values.
 
-        Upper bounds that are not found are None.
+        Upper bounds that are not found are infinite.
         """
-        rows: list[Record] = []
         for k, (name, unit) in enumerate(zip(self.outputs, self.units, strict=True)):
-            for j, level in enumerate(map(float, self.alpha)):
-                row: Record = {
+            for j, level in enumerate(self.alpha):
+                yield {
                     "output": name,
                     "unit": unit,
                     "alpha": level,
-                    "nominal": float(self.nominal[k]),
-                    "guaranteed lower": known(self.proved[j, k, 0]),
-                    "guaranteed upper": known(self.proved[j, k, 1]),
-                    "attained lower": known(self.attained[j, k, 0]),
-                    "attained upper": known(self.attained[j, k, 1]),
+                    "nominal": self.nominal[k],
+                    "guaranteed lower": self.proved[j, k, 0],
+                    "guaranteed upper": self.proved[j, k, 1],
+                    "attained lower": self.attained[j, k, 0],
+                    "attained upper": self.attained[j, k, 1],
                 }
-                rows.append(row)
-        return rows
 
     @property
     def cautions(self) -> list[str]:

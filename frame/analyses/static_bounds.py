@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,10 +11,10 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, checked_number, require, require_choice
 from alphacut.base.nature import Nature
-from alphacut.base.number_text import Table, engineering, percent_text
+from alphacut.base.number_text import engineering, percent_text
 from alphacut.base.progress_bar import Progress
 from alphacut.base.quantity import Quantity
-from alphacut.frame.analyses.answer import Answer, Record, table_of
+from alphacut.frame.analyses.answer import Answer, Row
 from alphacut.frame.analyses.limits import Limit, about_limit, limits_by_name
 from alphacut.frame.analyses.question import Asked, Question
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
@@ -65,27 +65,27 @@ class StaticBounds(Answer):
         largest = np.abs(self.attained).max(axis=-1)
         return np.asarray(distance / np.where(largest > 0, largest, 1.0))
 
-    def table(self) -> Table:
-        """Return a row for each output on the lowest level, then one for each limit."""
-        rows = []
+    def text_rows(self) -> Iterator[Row]:
+        """Yield a row for each output on the lowest level, then one for each limit."""
         for j, (name, unit) in enumerate(zip(self.outputs, self.units, strict=True)):
             ends = [engineering(x, unit) for x in self.bounds[0, j]]
             found = [engineering(x, unit) for x in self.attained[0, j]]
-            rows.append(
-                {
-                    "output": name,
-                    "at rest": f"{ends[0]} … {ends[1]}",
-                    "nature": str(Nature.GUARANTEED),
-                    "attained": f"{found[0]} … {found[1]}",
-                    "gap": percent_text(float(self.gaps[0, j])),
-                }
-            )
+            yield {
+                "output": name,
+                "at rest": f"{ends[0]} … {ends[1]}",
+                "nature": str(Nature.GUARANTEED),
+                "attained": f"{found[0]} … {found[1]}",
+                "gap": percent_text(float(self.gaps[0, j])),
+            }
         for name, limit in self.limits.items():
             j = self.outputs.index(limit.output)
-            words = {"output": str(about_limit(limit, self.units[j]).words), "nature": "guaranteed"}
-            rows.append({**words, "at rest": self.verdicts[name], "attained": "", "gap": ""})
-        titles = ("output", "at rest", "nature", "attained", "gap")
-        return table_of([{title: row[title] for title in titles} for row in rows])
+            yield {
+                "output": about_limit(limit, self.units[j]).words,
+                "at rest": self.verdicts[name],
+                "nature": str(Nature.GUARANTEED),
+                "attained": "",
+                "gap": "",
+            }
 
     @property
     def verdicts(self) -> dict[str, str]:
@@ -108,24 +108,20 @@ class StaticBounds(Answer):
             found[name] = verdict
         return found
 
-    def records(self) -> list[Record]:
-        """Return a row for each output and level."""
-        rows: list[Record] = []
+    def number_rows(self) -> Iterator[Row]:
+        """Yield a row for each output and level."""
         for level, alpha in enumerate(self.alpha):
             for j, name in enumerate(self.outputs):
-                rows.append(
-                    {
-                        "output": name,
-                        "unit": self.units[j],
-                        "alpha": float(alpha),
-                        "lower bound": float(self.bounds[level, j, 0]),
-                        "smallest attained": float(self.attained[level, j, 0]),
-                        "nominal": float(self.nominal[j]),
-                        "largest attained": float(self.attained[level, j, 1]),
-                        "upper bound": float(self.bounds[level, j, 1]),
-                    }
-                )
-        return rows
+                yield {
+                    "output": name,
+                    "unit": self.units[j],
+                    "alpha": alpha,
+                    "lower bound": self.bounds[level, j, 0],
+                    "smallest attained": self.attained[level, j, 0],
+                    "nominal": self.nominal[j],
+                    "largest attained": self.attained[level, j, 1],
+                    "upper bound": self.bounds[level, j, 1],
+                }
 
     def compared(self) -> dict[str, float | str]:
         """Return the verdicts."""
@@ -170,7 +166,7 @@ class Static(Question):
     limits: tuple[Limit, ...] = ()
     gap: Annotated[float, Quantity(above=0, maximum=1)] = 0.01
 
-    def require(self, model: StructureModel) -> None:
+    def require(self, model: StructureModel, components: int) -> None:
         """Refuse a structure that is not linear, and one without static forces."""
         _linear(model, self.outputs)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product
 from math import ceil, pi
@@ -14,14 +14,13 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, checked_number, require, require_choice
 from alphacut.base.number_text import (
     STANDARD_GRAVITY,
-    Table,
     engineering,
     percent_text,
     range_text,
 )
 from alphacut.base.progress_bar import Progress, nth_subprogress
 from alphacut.frame.analyses.angles import TURN, angle_peaks, angle_response
-from alphacut.frame.analyses.answer import Answer, Record, known, table_of
+from alphacut.frame.analyses.answer import Answer, Row
 from alphacut.frame.analyses.limits import Limit
 from alphacut.frame.analyses.peaks import Peak, Peaks, close_peaks, largest_peaks, with_combined
 from alphacut.frame.boxes import ALPHA, boxes
@@ -386,13 +385,12 @@ class SuitePeaks(Answer):
     peak: dict[str, Peak]
     farthest_record: dict[str, str]
 
-    def table(self) -> Table:
-        """Return a table of texts with a row for each of the largest peaks, and for each mean.
+    def text_rows(self) -> Iterator[Row]:
+        """Yield a row for each of the largest peaks, and for each mean.
 
         The columns are the name of the peak, its range at the lowest level, the guarantee, the
         attained value, and the record under which it is attained, empty for a mean.
         """
-        rows = []
         for name, peak in self.peak.items():
             unit = self.units[output_of(name)]
             ends = range_text(float(peak.lower[0]), float(peak.upper[0]), peak.nature)
@@ -400,15 +398,13 @@ class SuitePeaks(Answer):
             attained_text = "not known"
             if np.isfinite(attained):
                 attained_text = engineering(attained, unit)
-            row = {
+            yield {
                 "peak of": name,
                 f"at α = {self.alpha[0]:g}": f"{ends} {unit}".strip(),
-                "nature": self.nature_text(peak.nature),
+                "nature": peak.nature,
                 "reached": attained_text,
                 "record": self.where(name),
             }
-            rows.append(row)
-        return table_of(rows)
 
     def where(self, name: str) -> str:
         """Return the record under which a peak is attained, with its angle if all are meant."""
@@ -418,43 +414,40 @@ class SuitePeaks(Answer):
             return record
         return f"{record}, {worst.angle:.1f}°"
 
-    def records(self) -> list[Record]:
-        """Return a row for each record and peak, and then one for each peak and statistic.
+    def number_rows(self) -> Iterator[Row]:
+        """Yield a row for each record and peak, and then one for each peak and statistic.
 
         The columns are the record, its intensity measures in m/s², name and SI unit of the peak,
-        the bound of the farthest peak and the attained value on the lowest level, None if not
-        known, and the guarantee; for all angles also that of the attained value in degrees. In the
+        the bound of the farthest peak and the attained value on the lowest level, and the
+        guarantee; for all angles also that of the attained value in degrees. In the
         rows of "mean", "median" and "84 %" quantile of the bounds
         over all records, measures, attained values and guarantee are None.
         """
-        rows: list[Record] = []
+        row: dict[str, str | float | Nature | None] = {}
         for name, record in self.by_record.items():
             for peak_name, peak in record.peak.items():
-                row: Record = {
+                row = {
                     "record": name,
                     "PGA [m/s^2]": record.measures["PGA"],
                     "Sa(T1) [m/s^2]": record.measures["Sa(T1)"],
                     "output": peak_name,
                     "unit": self.units[output_of(peak_name)],
-                    "farthest peak": known(peak.far_end[0]),
-                    "peak reached": known(peak.reached[0]),
-                    "nature": self.nature_text(peak.nature),
+                    "farthest peak": peak.far_end[0],
+                    "peak reached": peak.reached[0],
+                    "nature": peak.nature,
                 }
                 if self.has_angles:
                     row["angle [deg]"] = None if peak.worst is None else peak.worst.angle
-                rows.append(row)
-        no_values = dict.fromkeys(rows[0])
+                yield row
         for peak_name, statistics in self.statistics.items():
             for statistic, bound in statistics.items():
-                row = {
+                # Statistics have no measures and no guarantee of their own.
+                yield dict.fromkeys(row) | {
                     "record": f"{statistic} of all",
                     "output": peak_name,
                     "unit": self.units[output_of(peak_name)],
-                    "farthest peak": known(bound[0]),
+                    "farthest peak": bound[0],
                 }
-                # Statistics have no measures and no guarantee of their own.
-                rows.append(no_values | row)
-        return rows
 
     def words(self) -> str:
         """Return sentences on what the peaks, the means and the angles belong to."""

@@ -8,17 +8,17 @@ does. Each step computes one envelope on the supports alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 
 from alphacut.base.errors import RefusedError, checked_number
-from alphacut.base.number_text import MINUS, Table, engineering, rounded_ends
+from alphacut.base.number_text import MINUS, engineering, rounded_ends
 from alphacut.base.progress_bar import Progress
 from alphacut.base.quantity import Quantity
-from alphacut.frame.analyses.answer import Answer, Record, table_of
+from alphacut.frame.analyses.answer import Answer, Row
 from alphacut.frame.analyses.limits import Limit, limits_by_name
 from alphacut.frame.analyses.peaks import PEAK_ERROR, Peak, Peaks, peaks
 from alphacut.frame.analyses.question import Asked, Question
@@ -114,8 +114,8 @@ class Tolerances(Answer):
         """Return the largest scale that keeps the limits, if there is one."""
         return {} if self.kept is None else {"scale of tolerances": self.kept}
 
-    def table(self) -> Table:
-        """Return a table of texts: a row on the scale, then a row on the support of each input.
+    def text_rows(self) -> Iterator[Row]:
+        """Yield a row on the scale, then a row on the support of each input.
 
         The columns are the quantity; the scale, or the support, up to which exceeding a limit is
         excluded, rounded inwards ("none" or "–" if there is none); and the guarantee. The last
@@ -129,7 +129,7 @@ class Tolerances(Answer):
                 scale += ", the largest tried"
         elif self.passed == 0:
             scale = "none: the nominal inputs exceed a limit"
-        rows = [self._row("scale of all ranges", kept=scale, beside=self._exceeded_text())]
+        yield self._row("scale of all ranges", kept=scale, beside=self._exceeded_text())
         for name, support in self.supports.items():
             text = "–"
             relative = ""
@@ -141,11 +141,10 @@ class Tolerances(Answer):
                 relative = f"about {support.nominal:g}"
                 if support.nominal:
                     relative = ", ".join(f"{x / support.nominal - 1:+.2%}" for x in support.kept)
-            row = self._row(f"tolerance of {name}", kept=text, beside=relative.replace("-", MINUS))
-            rows.append(row)
-        return table_of(rows)
+            relative = relative.replace("-", MINUS)
+            yield self._row(f"tolerance of {name}", kept=text, beside=relative)
 
-    def _row(self, quantity: str, *, kept: str, beside: str) -> dict[str, str]:
+    def _row(self, quantity: str, *, kept: str, beside: str) -> Row:
         """Return a row of the table by the titles of its four columns.
 
         Args:
@@ -156,7 +155,7 @@ class Tolerances(Answer):
         return {
             "quantity": quantity,
             "no limit exceeded": kept,
-            "nature": self.nature_text(self.nature),
+            "nature": self.nature,
             "limit exceeded, or relative": beside,
         }
 
@@ -175,16 +174,15 @@ class Tolerances(Answer):
             return exceeded
         return f"no exceedance found up to {self.clear:.4g}, {exceeded}"
 
-    def records(self) -> list[Record]:
-        """Return a row of numbers on the scale, then a row on the support of each input.
+    def number_rows(self) -> Iterator[Row]:
+        """Yield a row of numbers on the scale, then a row on the support of each input.
 
         The columns are the quantity and its SI unit; the ends of the support, scaled so far that
         exceeding a limit is still excluded (for the row of the scale the scale alone), None if
         there is no such scale; the ends of the support as it was given (for the scale 1); the
         nominal value; and the guarantee.
         """
-        nature = self.nature_text(self.nature)
-        scale: Record = {
+        yield {
             "quantity": "scale of all ranges",
             "unit": "",
             "from": None,
@@ -192,23 +190,20 @@ class Tolerances(Answer):
             "from in the case": None,
             "to in the case": 1.0,
             "most plausible": None,
-            "nature": nature,
+            "nature": self.nature,
         }
-        rows = [scale]
         for name, support in self.supports.items():
-            row = scale | {
+            kept = (None, None) if self.kept is None else support.kept
+            yield {
                 "quantity": name,
                 "unit": support.unit,
-                "from": None,
-                "to": None,
+                "from": kept[0],
+                "to": kept[1],
                 "from in the case": support.own[0],
                 "to in the case": support.own[1],
                 "most plausible": support.nominal,
+                "nature": self.nature,
             }
-            if self.kept is not None:
-                row["from"], row["to"] = support.kept
-            rows.append(row)
-        return rows
 
     def words(self) -> str:
         """Return sentences on how to read the scale."""

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.nature import Nature
-from alphacut.base.number_text import Table, engineering, rounded_ends
-from alphacut.frame.analyses.answer import Answer, Record
+from alphacut.base.number_text import engineering, rounded_ends
+from alphacut.frame.analyses.answer import Answer, Row
 from alphacut.fuzzy.result import Ends
 
 
@@ -126,47 +126,64 @@ class LearnedInputs(Answer):
         """Whether no parameters in their priors agree with the measured modes."""
         return bool(self.refuted)
 
-    def table(self) -> Table:
-        """Return a table of texts with a row for each parameter and for each mode held out.
+    def text_rows(self) -> Iterator[Row]:
+        """Yield a row for each parameter and for each mode held out.
 
         The columns are the name; the prior, or the measured frequency; the range that was learned
         on the lowest level, or the predicted range of the frequency; and the width of the learned
         range in per cent of the prior's, or whether the measured frequency lies inside.
         """
-        rows: list[tuple[str, ...]] = []
         for name in self.inputs:
-            before = outer_text(self.prior[name], self.units[name])
-            after = outer_text(self._learned(name), self.units[name])
-            rows.append((name, before, after, f"{self.narrowed[name]:.0%} of the width"))
+            yield {
+                "input or mode": name,
+                "before, measured": outer_text(self.prior[name], self.units[name]),
+                "learned, predicted": outer_text(self._learned(name), self.units[name]),
+                "": f"{self.narrowed[name]:.0%} of the width",
+            }
         for mode in self.held_out:
-            predicted = outer_text(mode.predicted, "Hz")
-            rows.append((f"mode {mode.mode}", f"{mode.measured:.4g} Hz", predicted, mode.verdict))
-        return Table(("input or mode", "before, measured", "learned, predicted", ""), rows)
+            yield {
+                "input or mode": f"mode {mode.mode}",
+                "before, measured": f"{mode.measured:.4g} Hz",
+                "learned, predicted": outer_text(mode.predicted, "Hz"),
+                "": mode.verdict,
+            }
 
     def _learned(self, name: str) -> tuple[float, float]:
         """Return the ends of the box of a parameter on the lowest level."""
         ends = self.inputs[name]
         return float(ends.lower[0]), float(ends.upper[0])
 
-    def records(self) -> list[Record]:
-        """Return a row of numbers for each parameter and for each mode held out, in SI units.
+    def number_rows(self) -> Iterator[Row]:
+        """Yield a row of numbers for each parameter and for each mode held out, in SI units.
 
         The columns are name, unit, both ends of the prior (or twice the measured frequency), both
         ends of the range that was learned or predicted on the lowest level, the width of the
         learned range over that of the prior (None for a mode), and "inside" or "outside" for a
         mode (empty for a parameter).
         """
-        rows: list[Record] = []
         for name in self.inputs:
-            row = _record(
-                name, self.units[name], before=self.prior[name], after=self._learned(name)
-            )
-            rows.append(row | {"fraction of the width": self.narrowed[name]})
+            before, after = self.prior[name], self._learned(name)
+            yield {
+                "input or mode": name,
+                "unit": self.units[name],
+                "before or measured, from": before[0],
+                "before or measured, to": before[1],
+                "from": after[0],
+                "to": after[1],
+                "fraction of the width": self.narrowed[name],
+                "inside": "",
+            }
         for mode in self.held_out:
-            measured = (mode.measured, mode.measured)
-            row = _record(f"mode {mode.mode}", "Hz", before=measured, after=mode.predicted)
-            rows.append(row | {"inside": mode.verdict})
-        return rows
+            yield {
+                "input or mode": f"mode {mode.mode}",
+                "unit": "Hz",
+                "before or measured, from": mode.measured,
+                "before or measured, to": mode.measured,
+                "from": mode.predicted[0],
+                "to": mode.predicted[1],
+                "fraction of the width": None,
+                "inside": mode.verdict,
+            }
 
     def words(self) -> str:
         """Return what the boxes claim, or why the frame is refuted."""
@@ -177,32 +194,6 @@ class LearnedInputs(Answer):
         return self.refuted or super().__str__()
 
     __repr__ = __str__
-
-
-def _record(
-    name: str, unit: str, *, before: tuple[float, float], after: tuple[float, float]
-) -> Record:
-    """Return a row of numbers about a parameter or a mode that was held out.
-
-    The last two columns are left None and empty. The caller fills in "fraction of the width" of a
-    parameter and "inside" of a mode.
-
-    Args:
-        name: Name of the parameter, or "mode 2" and so on.
-        unit: SI unit of the numbers.
-        before: Ends of the prior, or twice the measured frequency.
-        after: Ends of the learned range, or of the predicted frequency.
-    """
-    return {
-        "input or mode": name,
-        "unit": unit,
-        "before or measured, from": before[0],
-        "before or measured, to": before[1],
-        "from": after[0],
-        "to": after[1],
-        "fraction of the width": None,
-        "inside": "",
-    }
 
 
 def outer_text(ends: tuple[float, float], unit: str) -> str:

@@ -104,13 +104,13 @@ def record_spectrum(
     )
 
 
-def checked_periods(periods: ArrayLike) -> Array:
+def checked_periods(periods: ArrayLike, key: str = "periods") -> Array:
     """Return periods as an array; raises RefusedError if one is neither 0 nor from 0.001 s on."""
-    require_numbers("periods", np.asarray(periods))
+    require_numbers(key, np.asarray(periods))
     shaped = np.asarray(periods, float)
     smallest = shaped[shaped != 0].min(initial=np.inf)
     allowed = f"0 s, and periods from {MIN_PERIOD:g} s on"
-    require(smallest >= MIN_PERIOD, "periods", f"{smallest:g} s", allowed)
+    require(smallest >= MIN_PERIOD, key, f"{smallest:g} s", allowed)
     return shaped
 
 

@@ -89,15 +89,13 @@ def test_limits_without_a_meaning_are_refused(text):
 
 
 def test_every_question_is_complete():
-    """Of each entry the class of the answer, the section, the function and the pictures exist."""
+    """Of each entry the class of the answer, the section and the pictures exist."""
     asked = set()
     for key, analysis in ANALYSES.items():
         assert answer_class(key).key == key
         if analysis.section:
             asked.add(key)
             assert section_at(key, analysis.section).key == key
-        if analysis.compute:
-            assert callable(resolve_name(analysis.compute))
         for picture in analysis.pictures.values():
             assert picture.caption
             assert callable(resolve_name(picture.draw))

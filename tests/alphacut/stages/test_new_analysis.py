@@ -8,7 +8,7 @@ import pytest
 
 from alphacut import main
 from alphacut.base.errors import require
-from alphacut.base.number_text import Table
+from alphacut.base.nature import Nature
 from alphacut.base.quantity import Quantity
 from alphacut.case.analyses import ANALYSES, Analysis, Picture
 from alphacut.frame import Limit
@@ -37,11 +37,11 @@ class Stiffness(Answer):
     modulus: float
     limits: dict[str, float]
 
-    def table(self):
-        return Table(("what", "modulus", "nature"), [("E", f"{self.modulus:g}", "guaranteed")])
+    def text_rows(self):
+        yield {"what": "E", "modulus": f"{self.modulus:g}", "nature": Nature.GUARANTEED}
 
-    def records(self):
-        return [{"what": "E", "modulus [Pa]": self.modulus}]
+    def number_rows(self):
+        yield {"what": "E", "modulus [Pa]": self.modulus}
 
     def words(self):
         return "It is the upper end of the support."
@@ -62,7 +62,7 @@ class Stiffest(Question):
     count: Annotated[int, Quantity(minimum=1, is_integer=True)] = 3
     limits: tuple[Limit, ...] = ()
 
-    def require(self, model):
+    def require(self, model, components):
         require(self.count < 5, "count", self.count, "fewer than 5")
 
     def answer(self, asked, progress):
