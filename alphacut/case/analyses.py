@@ -32,9 +32,8 @@ class Analysis(NamedTuple):
         answer: Class of the answer.
         pictures: Figures of the answer by their names. They stand on the page in the section of the
             answer, in this order.
-        section: Class of the section of the case: a `Section` with a stage of its own, or a frozen
-            dataclass of options derived from `alphacut.frame.analyses.question:Question`, from
-            which the section is made. Empty for an answer that follows from another section.
+        section: Frozen dataclass of options, a `Question` of `alphacut.frame.analyses.question`,
+            from which the section of the case is made. Empty for what follows from another answer.
         stage: Name of the stage, which a case lists in `stages`, that computes the answer.
     """
 
@@ -115,7 +114,7 @@ ANALYSES: dict[str, Analysis] = {
                 "The response spectrum, and the modes of the most plausible structure on it",
             )
         },
-        "alphacut.case.spectrum:ResponseSpectrumSection",
+        "alphacut.frame.analyses.spectrum_question:SpectrumQuestion",
         stage="response_spectrum",
     ),
     "spectrum_checks": Analysis(

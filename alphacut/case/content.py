@@ -10,12 +10,11 @@ from pathlib import Path
 from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.analyses import ANALYSES
 from alphacut.case.cell import CellContent
-from alphacut.case.limits import AnalysisSection, QuestionSection
+from alphacut.case.generated import AnalysisSection, QuestionSection
 from alphacut.case.loads import ForceSection, RecordsSection, with_forces
 from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection, Identify, Study
 from alphacut.case.parse import ParsedCase, parse
-from alphacut.case.spectrum import ResponseSpectrumSection
 from alphacut.case.structure import MaterialDamping, Structure, StructureSection
 from alphacut.case.structures import STRUCTURES, with_structures
 from alphacut.case.types import AtFirstUse, require_alone
@@ -76,7 +75,7 @@ class Content(CellContent):
         """
         peaks: dict[str, None] = {}
         for section in self.questions.values():
-            if not section.reads_peaks:
+            if not section.made_from.reads_peaks:
                 continue
             for limit in section.limits:
                 name = limit.peak
@@ -93,9 +92,14 @@ class Content(CellContent):
         """
         if not yields(structure.model):
             return ()
-        asked = [x for x in self.questions.values() if x.reads_peaks]
+        asked = [x for x in self.questions.values() if x.made_from.reads_peaks]
         limits = [side for x in asked for y in x.limits_of(structure) for side in y.one_sided]
         return tuple(limits)
+
+    @property
+    def component_count(self) -> int:
+        """Number of components of each record; 0 without records."""
+        return 0 if self.records is None else self.records.component_count
 
     @property
     def stated_fraction(self) -> float | None:
@@ -188,11 +192,12 @@ class Content(CellContent):
         for stage in self.stages:
             for section in self.asked(stage).values() if stage != "envelope" else ():
                 structure = self._one_structure()
-                if isinstance(section, ResponseSpectrumSection):
-                    self._require_spectrum(section, structure)
+                is_possible = self.identify is None or section.made_from.of_learned_set
+                allowed = "without [identify], whose set is no box"
+                require(is_possible, section.key, "beside [identify]", allowed)
                 self._require_inputs(section.key, getattr(section, "fuzzy", ()), structure)
                 self._require_modulus()
-                section.require_answerable(structure, 0)
+                section.require_answerable(structure, self.component_count)
 
     def _require_excitation(self) -> None:
         """Refuse a structure that starts at rest and has no loads.
@@ -217,7 +222,7 @@ class Content(CellContent):
     def _require_no_questions_to_records(self) -> None:
         """Refuse what only a suite of records answers."""
         for key, section in self.asked().items():
-            is_answered = section.records != "needed"
+            is_answered = section.made_from.records != "needed"
             require(is_answered, key, "without records", "beside [records]")
         for key, question in self.questions.items():
             means = ", ".join(limit.text for limit in question.limits if limit.side == "mean")
@@ -244,7 +249,7 @@ class Content(CellContent):
             section.require_pattern()
             self._require_directions(records, section)
         # For these sections it is not defined how results under several records make one result.
-        refused = [key for key, x in self.asked().items() if x.records == "refused"]
+        refused = [key for key, x in self.asked().items() if x.made_from.records == "refused"]
         for key in (*refused, "identify", "study"):
             allowed = "[decision] and [fragility], of one motion for each record"
             require(not getattr(self, key), key, "beside [records]", allowed)
@@ -320,9 +325,8 @@ class Content(CellContent):
             require(is_first, f"study[{number}].name", study.name, "a name of its own")
             names.append(study.name)
         self._require_modulus()
-        components = self.records.component_count if self.records is not None else 0
         for section in self.asked().values():
-            section.require_answerable(structure, components)
+            section.require_answerable(structure, self.component_count)
         if self.identify is not None:
             is_framed = structure.model.floors > 0
             require(is_framed, "identify", "without a frame", "beside [frame]")
@@ -375,17 +379,6 @@ class Content(CellContent):
             computed = "E"
         stated = [name for name in names if not re.fullmatch(computed, name)]
         structure.inputs(stated, f"{key}.fuzzy")
-
-    def _require_spectrum(self, section: ResponseSpectrumSection, structure: Structure) -> None:
-        """Refuse a structure and records that the response-spectrum method cannot take."""
-        allowed = "without [identify], whose set is no box"
-        require(self.identify is None, section.key, "beside [identify]", allowed)
-        suite = () if self.records is None else self.records.suite
-        has_single = all(len(components) == 1 for components in suite)
-        allowed = "records of one component, beside [response_spectrum]"
-        require(has_single, "records.files", "of several components", allowed)
-        is_linear = structure.linear is not None and not yields(structure.model)
-        require(is_linear, "response_spectrum", "of another structure", "linear structures")
 
     def _require_modulus(self) -> None:
         """Refuse columns whose modulus no stage computes."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import MISSING, asdict, fields, replace
 from functools import cache, reduce
 from operator import or_
@@ -12,19 +13,25 @@ from pkgutil import resolve_name
 from types import UnionType
 from typing import Annotated, Any, ClassVar, Self, Union, cast, get_args, get_origin, get_type_hints
 
-from pydantic import Field, create_model
+from pydantic import Field, ValidationInfo, create_model
 
 from alphacut.base import quantity
-from alphacut.base.errors import require
-from alphacut.case.limits import AnalysisSection, AnyLimit, CaseLimit, Limits, QuestionSection
+from alphacut.base.errors import RefusedError, require
+from alphacut.case.limits import AnyLimit, CaseLimit, Limits
 from alphacut.case.structure import Structure
-from alphacut.case.types import Levels, Names, OneOrMany, Quantity, Section
-from alphacut.frame import Limit
+from alphacut.case.types import Levels, Names, OneOrMany, Quantity, Section, case_file, text
+from alphacut.frame import Limit, TargetSpectrum, read_spectrum
+from alphacut.frame.analyses.limits import limits_by_name
 from alphacut.frame.analyses.question import Asked, Question
 from alphacut.frame.structures.storey import yields
 
 KINDS: dict[str, Any] = {"fuzzy": Names, "outputs": Names, "alpha": Levels}
 """Types of keys that all sections read alike."""
+
+
+def _read_spectrum(value: object, info: ValidationInfo) -> TargetSpectrum:
+    """Return the spectrum in a file that the case names."""
+    return read_spectrum(case_file(value, info))
 
 
 @cache
@@ -33,7 +40,7 @@ def section_at(key: str, place: str) -> type[Section]:
 
     Args:
         key: Name of the section.
-        place: "module:Class" of a `Section`; or of a `Question`, whose fields are the keys.
+        place: "module:Class" of a `Section`; or of a dataclass, whose fields are the keys.
     """
     found = resolve_name(place)
     if issubclass(found, Section):
@@ -41,16 +48,16 @@ def section_at(key: str, place: str) -> type[Section]:
     return section_of(key, found)
 
 
-def section_of(key: str, question: type[Question]) -> type[AnalysisSection]:
-    """Return the section whose keys are the fields of a question, a frozen dataclass.
+def section_of(key: str, of: type) -> type[MadeSection]:
+    """Return the section whose keys are the fields of a frozen dataclass, as of a question.
 
     Units and ranges are those of the fields' `Quantity`, descriptions those of the docstring below
     "Args:". Limits are read as in [decision].
     """
-    hints = get_type_hints(question, include_extras=True)
-    described = descriptions(question)
+    hints = get_type_hints(of, include_extras=True)
+    described = {name: about for x in of.__mro__ for name, about in descriptions(x).items()}
     keys: dict[str, Any] = {}
-    for x in fields(cast("Any", question)):
+    for x in fields(of):
         default: Any = ... if x.default is MISSING else x.default
         if x.default_factory is not MISSING:
             default = x.default_factory()
@@ -59,13 +66,13 @@ def section_of(key: str, question: type[Question]) -> type[AnalysisSection]:
             keys[x.name] = (kind, Field(default, description=described[x.name]))
         elif default is not ...:
             keys[x.name] = (tuple[AnyLimit, ...], Field((), description=described[x.name]))
-    base = GeneratedQuestion if "limits" in hints else GeneratedSection
-    made: type[GeneratedSection] = create_model(question.__name__, __base__=base, **keys)
-    made.__doc__ = inspect.getdoc(question)
+    base = AnalysisSection if issubclass(of, Question) else MadeSection
+    if "limits" in hints:
+        base = QuestionSection
+    made: type[MadeSection] = create_model(of.__name__, __base__=base, **keys)
+    made.__doc__ = inspect.getdoc(of)
     made.key = key
-    made.made_from = question
-    for fact in ("reads_peaks", "needs_magnitudes", "records", "all_angles"):
-        setattr(made, fact, getattr(question, fact))
+    made.made_from = of
     return made
 
 
@@ -73,6 +80,8 @@ def _in_a_case(hint: Any) -> Any:
     """Return the type of a key from that of a field: quantities are read with their units."""
     if isinstance(hint, quantity.Quantity):
         return Quantity(**asdict(hint))
+    if hint is TargetSpectrum:
+        return Annotated[TargetSpectrum, text(_read_spectrum)]
     arguments = get_args(hint)
     origin = get_origin(hint)
     if origin is Annotated:
@@ -96,15 +105,58 @@ def descriptions(of: type) -> dict[str, str]:
     return {name: " ".join(about.split()) for name, about in found}
 
 
-class GeneratedSection(AnalysisSection):
-    """Keys that are the fields of a question."""
+class MadeSection(Section):
+    """Keys that are the fields of a frozen dataclass; `key` is the name of the section."""
 
-    made_from: ClassVar[type[Question]]
+    key: ClassVar[str]
+    made_from: ClassVar[Any]
 
     @property
     def stated(self) -> dict[str, Any]:
         """The values of all keys."""
         return {name: getattr(self, name) for name in type(self).model_fields}
+
+    @property
+    def made(self) -> Any:
+        """The object of the dataclass."""
+        return self.made_from(**self.stated)
+
+    def require_consistent(self) -> None:
+        """Refuse what fields forbid each other."""
+        super().require_consistent()
+        with self.by_its_keys():
+            _ = self.made
+
+    @contextmanager
+    def by_its_keys(self) -> Iterator[None]:
+        """Name the key of the case in each RefusedError of the block, in place of an argument.
+
+        Fields are keys of the section, and "limit of …" is one of its limits. What is no key, as
+        "structure", stands behind the name of the section. Keys of other sections have a point.
+        """
+        try:
+            yield
+        except RefusedError as error:
+            name = "limits" if error.key.startswith("limit of") else error.key
+            if name in type(self).model_fields:
+                name = f"{self.key}.{name}"
+            elif "." not in name and name != self.key:
+                name = f"{self.key}: {name}"
+            raise RefusedError(name, error.value, error.allowed, error.cure) from None
+
+
+class AnalysisSection(MadeSection):
+    """A section that asks for an analysis of the structure, or of its response.
+
+    Its keys are the fields of a question, and so are `reads_peaks`, `needs_magnitudes`, `records`,
+    `all_angles` and `of_learned_set` the facts of it.
+    """
+
+    made_from: ClassVar[type[Question]]
+
+    def with_storeys(self, structure: Structure) -> Self:
+        """Return the section with what it says of every storey said of each."""
+        return self
 
     def question(self, structure: Structure) -> Question:
         """Return the question, with limits in the units of the outputs of the structure."""
@@ -112,15 +164,18 @@ class GeneratedSection(AnalysisSection):
 
     def require_consistent(self) -> None:
         """Refuse what fields forbid each other, and fields beside the one that replaces them."""
-        super().require_consistent()
         for key, others in self.made_from.replaced.items():
             given = ", ".join(x for x in others if self.has_key(x) and getattr(self, key))
             require(not given, f"{self.key}.{key}", f"beside {given}", "one of them")
-        with self.by_its_keys():
-            self.made_from(**self.stated)
+        super().require_consistent()
 
     def require_answerable(self, structure: Structure, components: int) -> None:
-        """Refuse what the question refuses of the nominal structure."""
+        """Refuse what the structure cannot answer.
+
+        Args:
+            structure: Structure of the case.
+            components: Number of components of the records that will move it; 0 without records.
+        """
         with self.by_its_keys():
             self.question(structure).require(structure.model, components)
         # A modulus E that stage modulus computes is still crisp here, and may be random in the run.
@@ -131,22 +186,38 @@ class GeneratedSection(AnalysisSection):
             value = getattr(self, name)
             require(is_used, f"{self.key}.{name}", value, "beside columns that yield")
 
+    def require_all_angles(self) -> None:
+        """Refuse what is not answered over all angles of incidence of two components."""
+        is_answered = self.made_from.all_angles
+        require(is_answered, self.key, "over all angles", "an angle in records.angle")
+
     def require_computable(self, structure: Structure, fuzzy: Sequence[str]) -> None:
-        """Refuse what the question refuses of the inputs."""
+        """Refuse what cannot be computed, once the structure has its materials.
+
+        Args:
+            structure: The structure; what a stage computes is fuzzy in it, of a width that is not
+                known yet.
+            fuzzy: Names of the fuzzy inputs of [envelope].
+        """
         asked = Asked(structure.model, structure.inputs(fuzzy), (0.0,))
         with self.by_its_keys():
             self.question(structure).require_computable(asked)
 
 
-class GeneratedQuestion(GeneratedSection, QuestionSection):
-    """Keys that are the fields of a question, with limits and perhaps states, of limits each."""
+class QuestionSection(AnalysisSection):
+    """Keys of a question about limits of outputs, and perhaps about states, of limits each."""
+
+    limits: Limits
+    """limits of outputs, 'drift1 <= 40 mm', 'max q3 <= 80 mm', 'min q3 >= -60 mm';
+    'drift <= 1 %' or 'drift <= 1/200' of the height of every storey, 'base_shear <= 8 %' of the
+    weight"""
 
     def with_storeys(self, structure: Structure) -> Self:
         """Return the section with each limit of every storey as one limit for each storey.
 
         The limits of states are among them, each with its state as its event.
         """
-        limits = list(super().with_storeys(structure).limits)
+        limits = [x for limit in self.limits for x in limit.by_storey(structure)]
         for name, members in self._states_of(structure).items():
             limits += [replace(limit, event=name) for limit in members]
         return self.model_copy(update={"limits": tuple(limits)})
@@ -169,3 +240,30 @@ class GeneratedQuestion(GeneratedSection, QuestionSection):
             limits = {name: [x.limit(structure, key) for x in y] for name, y in states.items()}
             values |= {"limits": (), "states": limits}
         return self.made_from(**values)
+
+    def limits_of(self, structure: Structure) -> tuple[Limit, ...]:
+        """Return the limits of this question in SI units, in the order of the case.
+
+        Args:
+            structure: The structure. It gives units, heights of storeys and the weight, and says
+                which outputs it can have; it need not observe them.
+
+        Raises:
+            RefusedError: The structure cannot have an output; a unit, height or weight does not
+                fit; a limit is given twice; a limit of a magnitude is not positive; or there are
+                others than one limit of the magnitude of each output, if the question needs this.
+        """
+        key = f"{self.key}.limits"
+        limits = tuple(limit.limit(structure, key) for limit in self.limits)
+        structure.require_quantities(key, list(dict.fromkeys(x.output for x in self.limits)))
+        # Refuses limits that do not fit each other or the question; () stands for any outputs.
+        with self.by_its_keys():
+            limits_by_name(limits, (), magnitudes=self.made_from.needs_magnitudes)
+        return limits
+
+    def require_all_angles(self) -> None:
+        """Refuse limits of one side over all angles, where only magnitudes are bounded."""
+        super().require_all_angles()
+        sides = ", ".join(limit.text for limit in self.limits if limit.side in ("max", "min"))
+        allowed = "magnitudes over all angles, as roof <= 40 mm"
+        require(not sides, f"{self.key}.limits", sides, allowed)

@@ -1,4 +1,4 @@
-"""Limits of outputs, and the sections of the questions that are about them.
+"""Limits of outputs as the texts of a case state them.
 
 A limit is a text such as "drift1 <= 40 mm" or "drift1 <= 0.5 %" of the magnitude, "max q3 <= 80 mm"
 or "min q3 >= -60 mm" of one side, "mean drift1 <= 30 mm" of the mean over the records of a suite.
@@ -8,19 +8,17 @@ or "min q3 >= -60 mm" of one side, "mean drift1 <= 30 mm" of the mean over the r
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, Literal, Self, cast
+from typing import Annotated, cast
 
 from pydantic import PlainValidator
 
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.case.structure import Structure
-from alphacut.case.types import NotEmpty, Section
+from alphacut.case.types import NotEmpty
 from alphacut.frame import Limit
-from alphacut.frame.analyses.limits import Side, limits_by_name
+from alphacut.frame.analyses.limits import Side
 from alphacut.frame.structures.quantities import OUTPUTS, Output
 from alphacut.io import quantity
 
@@ -224,104 +222,3 @@ def parse_limit(value: object) -> CaseLimit:
 
 AnyLimit = Annotated[CaseLimit, PlainValidator(parse_limit)]
 Limits = Annotated[tuple[AnyLimit, ...], NotEmpty]
-
-
-class AnalysisSection(Section):
-    """A section that asks for an analysis of the structure, or of its response.
-
-    `key`: name of the section. `reads_peaks`: the answer follows from the peaks of the limited
-    outputs. `records`: whether a suite [records] is refused beside it, allowed or needed;
-    `all_angles`: whether its components may come from all angles.
-    """
-
-    key: ClassVar[str]
-    reads_peaks: ClassVar[bool] = False
-    records: ClassVar[Literal["refused", "allowed", "needed"]] = "refused"
-    all_angles: ClassVar[bool] = True
-
-    def with_storeys(self, structure: Structure) -> Self:
-        """Return the section with what it says of every storey said of each."""
-        return self
-
-    def require_answerable(self, structure: Structure, components: int) -> None:
-        """Refuse what the structure cannot answer.
-
-        Args:
-            structure: Structure of the case.
-            components: Number of components of the records that will move it; 0 without records.
-        """
-
-    def require_all_angles(self) -> None:
-        """Refuse what is not answered over all angles of incidence of two components."""
-        require(self.all_angles, self.key, "over all angles", "an angle in records.angle")
-
-    def require_computable(self, structure: Structure, fuzzy: Sequence[str]) -> None:
-        """Refuse what cannot be computed, once the structure has its materials.
-
-        Args:
-            structure: The structure; what a stage computes is fuzzy in it, of a width that is not
-                known yet.
-            fuzzy: Names of the fuzzy inputs of [envelope].
-        """
-
-    @contextmanager
-    def by_its_keys(self) -> Iterator[None]:
-        """Name the key of the case in each RefusedError of the block, in place of an argument.
-
-        Fields are keys of the section, and "limit of …" is one of its limits. What is no key, as
-        "structure", stands behind the name of the section.
-        """
-        try:
-            yield
-        except RefusedError as error:
-            name = "limits" if error.key.startswith("limit of") else error.key
-            if name in type(self).model_fields:
-                name = f"{self.key}.{name}"
-            elif not name.startswith(self.key):
-                name = f"{self.key}: {name}"
-            raise RefusedError(name, error.value, error.allowed, error.cure) from None
-
-
-class QuestionSection(AnalysisSection):
-    """A question about limits of outputs, as a section of the case.
-
-    `needs_magnitudes`: each output has one limit, of its magnitude.
-    """
-
-    needs_magnitudes: ClassVar[bool] = False
-    limits: Limits
-    """limits of outputs, 'drift1 <= 40 mm', 'max q3 <= 80 mm', 'min q3 >= -60 mm';
-    'drift <= 1 %' or 'drift <= 1/200' of the height of every storey, 'base_shear <= 8 %' of the
-    weight"""
-
-    def with_storeys(self, structure: Structure) -> Self:
-        """Return the section with each limit of every storey as one limit for each storey."""
-        limits = (x for limit in self.limits for x in limit.by_storey(structure))
-        return self.model_copy(update={"limits": tuple(limits)})
-
-    def limits_of(self, structure: Structure) -> tuple[Limit, ...]:
-        """Return the limits of this question in SI units, in the order of the case.
-
-        Args:
-            structure: The structure. It gives units, heights of storeys and the weight, and says
-                which outputs it can have; it need not observe them.
-
-        Raises:
-            RefusedError: The structure cannot have an output; a unit, height or weight does not
-                fit; a limit is given twice; a limit of a magnitude is not positive; or there are
-                others than one limit of the magnitude of each output, if the question needs this.
-        """
-        key = f"{self.key}.limits"
-        limits = tuple(limit.limit(structure, key) for limit in self.limits)
-        structure.require_quantities(key, list(dict.fromkeys(x.output for x in self.limits)))
-        # Refuses limits that do not fit each other or the question; () stands for any outputs.
-        with self.by_its_keys():
-            limits_by_name(limits, (), magnitudes=self.needs_magnitudes)
-        return limits
-
-    def require_all_angles(self) -> None:
-        """Refuse limits of one side over all angles, where only magnitudes are bounded."""
-        super().require_all_angles()
-        sides = ", ".join(limit.text for limit in self.limits if limit.side in ("max", "min"))
-        allowed = "magnitudes over all angles, as roof <= 40 mm"
-        require(not sides, f"{self.key}.limits", sides, allowed)

@@ -5,18 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf, isfinite, radians
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple, cast
+from typing import Annotated, Any, Literal, NamedTuple, cast
 
 import numpy as np
 from pydantic import Field, ValidationInfo
 
 from alphacut.base.errors import RefusedError, is_number, require, require_choice
-from alphacut.case.spectrum import SpectrumSection
+from alphacut.case.generated import section_at
 from alphacut.case.structure import Structure
 from alphacut.case.types import (
-    AtFirstUse,
+    FirstUse,
     NotEmpty,
     OneOrMany,
     Section,
@@ -377,6 +378,12 @@ def _require_one_ground(first: Recording, other: Recording) -> None:
     require(is_other, "records.files", f"{first.name} twice", "a file for each component")
 
 
+SPECTRUM = partial(
+    section_at, "records.spectrum", "alphacut.frame.spectra.code_spectrum:SuiteTarget"
+)
+"""The section of the target spectrum."""
+
+
 class RecordsSection(Section):
     """Suite of records of the ground's acceleration: each moves the structure by itself.
 
@@ -403,7 +410,7 @@ class RecordsSection(Section):
     `ω² max |u|` at the nominal structure's first period, with its own damping ratio (not 5 %). Of
     two components it is the larger one, "RotD50(T1) = 0.5 g" the median over all directions, and
     RotD100(T1) the largest one"""
-    spectrum: AtFirstUse[SpectrumSection] | None = None
+    spectrum: Annotated[Any, FirstUse(SPECTRUM)] | None = None
 
     @property
     def suite(self) -> tuple[tuple[Recording, ...], ...]:

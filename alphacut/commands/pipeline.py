@@ -16,12 +16,11 @@ from alphacut.base.errors import RefusedError, require
 from alphacut.base.kept_files import locked
 from alphacut.base.progress_bar import progress_reporter
 from alphacut.case.content import Case, Content
-from alphacut.case.generated import GeneratedSection
+from alphacut.case.generated import AnalysisSection
 from alphacut.case.loads import RecordsSection
 from alphacut.case.material import RadiusMapSection
 from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection
-from alphacut.case.spectrum import ResponseSpectrumSection
 from alphacut.case.structure import Structure
 from alphacut.commands.motion_text import load_end_warnings
 from alphacut.commands.options import read_case
@@ -41,7 +40,6 @@ from alphacut.stages import (
     microstructure,
     modulus,
     shares,
-    spectrum,
     suite,
 )
 from alphacut.stages.answers import asked_of
@@ -164,10 +162,8 @@ class Pipeline:
             self.compute_modulus()
         if "envelope" in stages:
             self._compute_motion()
-        if "response_spectrum" in stages:
-            self._compute_spectrum()
         for stage in stages:
-            if stage not in ("microstructure", "modulus", "envelope", "response_spectrum"):
+            if stage not in ("microstructure", "modulus", "envelope"):
                 self._compute_alone(stage)
         if self.content.shares:
             self._compute_shares()
@@ -273,8 +269,7 @@ class Pipeline:
             peaks = self._limited_peaks(task, structure)
             asked = asked_of(structure, task.fuzzy, section.alpha, peaks=peaks, **task.times)
         for key, question in content.asked().items():
-            stage = answers.stage(key, question, structure, asked)
-            results.answers[key] = self.store.take(stage).numbers
+            self._answer(key, question, structure, asked)
 
     def _structure(self) -> Structure:
         """Return the structure with the material that stage modulus found, if there is one."""
@@ -296,40 +291,29 @@ class Pipeline:
             RefusedError: An input, output or limit does not fit the structure.
             FailedError: The analysis fails.
         """
-        self.results.structure = structure = self._structure()
-        for key, question in self.content.asked(stage).items():
-            asked = asked_of(structure, *(getattr(question, name) for name in ("fuzzy", "alpha")))
-            alone = answers.stage(key, question, structure, asked)
-            self.results.answers[key] = self.store.take(alone).numbers
-
-    def _compute_spectrum(self) -> None:
-        """Compute combined peaks under a response spectrum, and what follows from them.
-
-        These are the verdicts on limits and, where a suite of records stands beside the section,
-        the errors of the method under each record. All are put into the answers of `results`.
-
-        Raises:
-            RefusedError: An input, output or limit does not fit the structure.
-            FailedError: A peak under a record is not bounded.
-        """
         content = self.content
-        (section,) = content.asked("response_spectrum").values()
-        assert isinstance(section, ResponseSpectrumSection)
-        structure = self._structure()
-        self.results.structure = structure
+        self.results.structure = structure = self._structure()
+        for key, section in content.asked(stage).items():
+            motions: dict[str, Any] = {}
+            is_moved = section.made_from.records != "refused"
+            if is_moved and content.records is not None and content.envelope is not None:
+                # Spectra are those of whole records, so that the motions last as long.
+                whole = content.envelope.model_copy(update={"duration": inf})
+                motions["records"] = suite.suite_records(content.records, whole, structure)
+                motions["step"] = content.envelope.step
+            fuzzy, alpha = (section.stated[name] for name in ("fuzzy", "alpha"))
+            self._answer(key, section, structure, asked_of(structure, fuzzy, alpha, **motions))
+
+    def _answer(
+        self, key: str, section: AnalysisSection, structure: Structure, asked: Asked
+    ) -> None:
+        """Compute the answer to the question of a section, and what else follows from it."""
         kept = self.results.answers
-        found = self.store.take(spectrum.stage(section, structure)).numbers
-        kept[found.key] = found
-        if section.has_checks:
-            checks = spectrum.checks_of(section, structure, found)
-            kept[checks.key] = checks
-        if content.records is not None and content.envelope is not None:
-            step = content.envelope.step
-            # Spectra are those of whole records, so that the motions last as long.
-            whole = content.envelope.model_copy(update={"duration": inf})
-            records = suite.suite_records(content.records, whole, structure)
-            stage = spectrum.accuracy_stage(section, structure, found, records, step)
-            kept[stage.name] = self.store.take(stage).numbers
+        question = section.question(structure)
+        stage = answers.stage(key, [section, asked], partial(question.answer, asked))
+        kept[key] = found = self.store.take(stage).numbers
+        for name, further in question.further(asked, found).items():
+            kept[name] = self.store.take(answers.stage(name, [section, asked], further)).numbers
 
     def _compute_envelopes(self, structure: Structure, section: EnvelopeSection) -> None:
         """Compute the envelopes of all studies into `results`, and check their errors.
@@ -401,8 +385,7 @@ class Pipeline:
         asked = asked_of(structure, task.fuzzy, task.section.alpha, records=records, **response)
         if (fragility := self.content.incremental_question) is None:
             return asked
-        generated = cast("GeneratedSection", fragility)
-        question = cast("FragilityQuestion", generated.question(structure))
+        question = cast("FragilityQuestion", fragility.question(structure))
         analyses = question.analyses(replace(asked, records=tuple(longest_first)))
         named = question.named_limits
         further = [suite.incremental_stage(named, *analysis) for analysis in analyses.items()]

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
+from alphacut.base.progress_bar import Progress
 from alphacut.case.analyses import answer_class
-from alphacut.case.generated import GeneratedSection
-from alphacut.case.limits import AnalysisSection
 from alphacut.case.structure import Structure
 from alphacut.frame.analyses.answer import Answer
 from alphacut.frame.analyses.question import Asked
@@ -31,15 +30,12 @@ def asked_of(
     return Asked(structure.model, inputs, alpha, numbers=numbers, input_units=units, **response)
 
 
-def stage(key: str, section: AnalysisSection, structure: Structure, asked: Asked) -> Stage[Answer]:
-    """Return the stage of the answer to the question of a section with a key."""
-    assert isinstance(section, GeneratedSection)  # others have stages of their own
-    question = section.question(structure)
+def stage(key: str, inputs: object, answer: Callable[[Progress], Answer]) -> Stage[Answer]:
+    """Return the stage of an answer with a key, which a function computes from some inputs."""
 
     def compute(context: StageContext) -> StageResult[Answer]:
-        """Answer the question, reporting progress to the context."""
-        return StageResult(question.answer(asked, context.tick))
+        """Return the answer, reporting progress to the context."""
+        return StageResult(answer(context.tick))
 
     # Answers are kept in the units and words of this package, so that its source counts as well.
-    packages = ("fuzzy", "frame", "alphacut")
-    return Stage(key, [section, asked], packages, answer_class(key), compute)
+    return Stage(key, inputs, ("fuzzy", "frame", "alphacut"), answer_class(key), compute)

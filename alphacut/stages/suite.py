@@ -23,6 +23,7 @@ from alphacut.frame.analyses.suites import (
     summarised,
 )
 from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.spectra.code_spectrum import SuiteTarget
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Nature
@@ -82,9 +83,9 @@ def scaled_suite(section: RecordsSection, structure: Structure) -> ScaledSuite |
         RefusedError: The target does not cover the range, a record is zero throughout, or the
             structure is not linear.
     """
-    spectrum = section.spectrum
-    if spectrum is None:
+    if section.spectrum is None:
         return None
+    spectrum: SuiteTarget = section.spectrum.made
     return scale_suite(
         [ground for (ground,) in _corrected(section)],  # of one component each
         spectrum.target,

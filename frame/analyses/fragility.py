@@ -9,7 +9,7 @@ proportional to the record; the limit is then exceeded on a set of measures, whi
 incremental dynamic analysis (`incremental`). α is a level of possibility, not a probability, and is
 never multiplied by one.
 
-A case reaches `fragility_of` as follows. `alphacut/case/limits.py` has the keys of [fragility].
+A case reaches `FragilityQuestion` as follows. `alphacut/case/generated.py` makes its section.
 `alphacut/stages/suite.py` computes the peaks under each record (`record_peaks` of
 `frame/analyses/suites.py`, `close_peaks` of `frame/analyses/peaks.py`),
 `alphacut/stages/answers.py` passes them on, and `alphacut/report/results.py` prints three columns
@@ -22,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 
@@ -38,7 +38,6 @@ from alphacut.frame.analyses.damage_states import (
     limits_of_states,
     lognormal_fit,
     pelicun_rows,
-    require_states,
 )
 from alphacut.frame.analyses.incremental import (
     GRID_RATIO,
@@ -60,10 +59,7 @@ from alphacut.frame.analyses.probability import CONFIDENCE, clopper_pearson
 from alphacut.frame.analyses.question import Asked, Question
 from alphacut.frame.analyses.suites import (
     MEASURES,
-    ScaledRecord,
-    SuitePeaks,
     nominal_mode,
-    over_records,
     record_peaks,
     scaled_records,
     summarised,
@@ -448,6 +444,7 @@ class FragilityQuestion(Question):
         value = "beside states" if self.limits else None
         is_one = bool(self.limits) != bool(self.states)
         require(is_one, "limits", value, "limits, or the limits of states")
+        checked_number("most", self.most, positive=True)
 
     @property
     def named_limits(self) -> dict[str, Limit]:
@@ -461,37 +458,135 @@ class FragilityQuestion(Question):
         require(is_measured, "measure", self.measure, "beside records of two components")
 
     def analyses(self, asked: Asked) -> dict[str, IncrementalAnalysis]:
-        """Return the incremental dynamic analysis of a frame that yields, by record."""
-        assert isinstance(asked.model, StoreyFrame)
-        return incremental_analyses(
-            asked.model,
-            asked.inputs,
-            asked.records,
-            self.named_limits,
-            intensity=self.measure,
-            most=self.most,
-            step=asked.step,
-            alpha=asked.alpha,
-        )
+        """Prepare an incremental dynamic analysis of a frame that yields for each record, by name.
+
+        Nothing is moved along the scales yet. Each record is divided by its intensity, so that the
+        scale of an analysis is the intensity measure. The largest one is the same for all.
+
+        Raises:
+            RefusedError: Levels or inputs are not allowed, or a response does not exist.
+            StepError: A response has too many events in a step, or its energy is not in balance.
+        """
+        limits = self.named_limits
+        names = list(limits)
+        pairs = [(limit.output, limit.number) for limit in limits.values()]
+        events = [[names.index(name) for name in members] for members in events_of(limits).values()]
+        cuts = boxes(asked.inputs, asked.alpha)
+        analyses = {}
+        for record in asked.records:
+            # A record divided by its intensity has the intensity 1.
+            unit_samples = np.asarray(record.ground.samples / record.measures[self.measure])
+            # A scaled record has no name and no remarks of its own.
+            ground = Accelerogram(record.ground.step, unit_samples)
+            frame = replace(cast("StoreyFrame", asked.model), ground=ground)
+            analyses[record.name] = IncrementalAnalysis(
+                frame, cuts, pairs, record.duration, asked.step, events=events
+            )
+        # All records are scaled up to the same measure. The first column of `elastic_scales` is the
+        # scale at which the frame yields; the others belong to the limits.
+        nominal = cuts.nominal[np.newaxis]
+        elastic = max(x.elastic_scales(nominal)[0, 1:].max() for x in analyses.values())
+        greatest = self.most * float(elastic)
+        return {name: replace(x, greatest_scale=greatest) for name, x in analyses.items()}
+
+    def moved(self, asked: Asked, progress: Progress | None = None) -> Asked:
+        """Return what is asked about with the peaks under each record, or over its scales.
+
+        Peaks of linear structures are proportional to the record, so that one scale suffices;
+        frames that yield are moved at many scales.
+        """
+        limits = self.named_limits
+        count = len(asked.records)
+        if yields(asked.model):
+            increments = {}
+            for k, (name, analysis) in enumerate(self.analyses(asked).items()):
+                tick = nth_subprogress(progress, k, count)
+                increments[name] = increments_of(analysis, limits, tick)
+            return replace(asked, increments=increments)
+        model = cast("LinearSystem", asked.model)
+        names = list(dict.fromkeys(limit.peak for limit in limits.values()))
+        times: dict[str, Any] = {"step": asked.step, "alpha": asked.alpha}
+        peaks = {}
+        for k, record in enumerate(asked.records):
+            tick = nth_subprogress(progress, k, count)
+            peaks[record.name] = record_peaks(
+                model, asked.inputs, record, names, progress=tick, **times
+            )
+        return replace(asked, suite=summarised(model, asked.inputs, asked.records, peaks, **times))
 
     def answer(self, asked: Asked, progress: Progress) -> Fragility:
         """Return the fragility, for which all but the nominal responses are known."""
-        model = asked.model
-        assert isinstance(model, LinearSystem)  # as `require` asks for
+        found = self._known(asked)
+        cuts = boxes(asked.inputs, asked.alpha)
+        if not self.states or (cuts.lower[-1] == cuts.upper[-1]).all():
+            return found
+        # The ends of measures over a cut belong to different structures under different records, so
+        # that their scatter is that of none: the nominal structure is moved besides.
+        inputs = {name: Crisp(value) for name, value in zip(cuts.names, cuts.nominal, strict=True)}
+        alone = replace(asked, inputs=inputs, alpha=(1.0,), suite=None, increments={})
+        nominal = self._known(self.moved(alone))
+        critical = {state: nominal.limits[state].critical for state in self.states}
+        return replace(found, nominal=critical)
+
+    def _known(self, asked: Asked) -> Fragility:
+        """Return the fragility from the peaks over a suite, or over the scales of its records."""
         limits = self.named_limits
-        found = fragility_of(
-            model,
-            limits,
-            intensity=self.measure,
-            independent=self.independent,
-            alpha=asked.alpha,
-            suite=asked.suite,
-            increments=asked.increments,
+        suite = asked.suite
+        events = events_of(limits)
+        demands = list(asked.increments.values())
+        critical: dict[str, CriticalMeasures] = {}
+        natures: dict[str, Nature] = {}
+        if demands:
+            for name in (*limits, *events):
+                critical[name] = CriticalMeasures.from_demands(demands, name)
+                natures[name] = Nature.ESTIMATED
+        elif suite is not None:
+            records = suite.by_record.values()
+            measures = [record.measures[self.measure] for record in records]
+            for name, limit in limits.items():
+                peaks = [record.peak[limit.peak] for record in records]
+                critical[name] = CriticalMeasures.from_peaks(peaks, measures, limit.outwards)
+                natures[name] = Nature.weakest(peak.nature for peak in peaks)
+            for event, members in events.items():
+                # Critical measures of linear structures are intervals of numbers; the event is
+                # reached with the first of its limits.
+                critical[event] = CriticalMeasures.of_any([critical[member] for member in members])
+                natures[event] = Nature.weakest(natures[member] for member in members)
+
+        about: dict[str, LimitResult] = {}
+        for name, limit in limits.items():
+            about[name] = about_limit(limit, asked.model.unit_of(limit.output))
+        for event, members in events.items():
+            for name in members:
+                about[name] = replace(about[name], event_name=event)
+            about[event] = LimitResult(output=event_words(event), is_event=True)
+        parts = {}
+        for name in about:
+            measure = _grid(critical[name], demands)
+            counts = critical[name].counts(measure)
+            if demands:
+                # The sets of measures of a yielding frame need not be intervals, so that they are
+                # counted one by one.
+                counts = counts_between(demands, name, measure)
+            parts[name] = _limit_fragility(
+                about[name],
+                natures[name],
+                critical[name],
+                measure,
+                counts,
+                independent=self.independent,
+            )
+        mode = nominal_mode(asked.model)
+        return Fragility(
+            encloses=suite.encloses if suite is not None else "",
+            alpha=np.array(asked.alpha, float),
+            measure=self.measure,
+            unit=MEASURES[self.measure],
+            period_s=mode.period,
+            damping_ratio=mode.ratio,
+            limits=parts,
+            increments=dict(asked.increments),
             states=tuple(self.states),
-        )
-        step = asked.step
-        return with_nominal(
-            found, model, asked.inputs, asked.records, limits, step=step, most=self.most
         )
 
 
@@ -912,105 +1007,19 @@ def fragility(
         >>> list(found.limits), found.measure
         (['q1'], 'Sa(T1)')
     """
-    if states:
-        require(not limits, "limits", value="beside states", allowed="one of them")
-        limits = limits_of_states(states)
-    named = limits_by_name(limits, ())
-    require_fragile(model, list(named.values()))
-    require_choice("intensity", intensity, MEASURES)
-    # Peaks of linear structures are proportional to the record, so that one scale suffices; frames
-    # that yield are moved at many scales.
-    peaks: SuitePeaks | None = None
-    increments: dict[str, Increments] = {}
-    if yields(model):
-        records = scaled_records(model, suite, duration=duration, step=step)
-        analyses = incremental_analyses(
-            model, inputs, records, named, intensity=intensity, most=most, step=step, alpha=alpha
-        )
-        for k, (name, analysis) in enumerate(analyses.items()):
-            tick = nth_subprogress(progress, k, len(analyses))
-            increments[name] = increments_of(analysis, named, tick)
-    else:
-        peaks = over_records(
-            model,
-            inputs,
-            suite,
-            duration=duration,
-            step=step,
-            alpha=alpha,
-            names=list(dict.fromkeys(limit.peak for limit in named.values())),
-            progress=progress,
-        )
-    found = fragility_of(
-        model,
-        named,
-        intensity=intensity,
-        independent=independent,
-        alpha=alpha,
-        suite=peaks,
-        increments=increments,
-        states=tuple(states or ()),
+    question = FragilityQuestion(
+        (limits,) if isinstance(limits, Limit) else tuple(limits),
+        dict(states or {}),
+        cast("Any", intensity),
+        independent,
+        most,
     )
-    scaled = scaled_records(model, suite, duration=duration, step=step)
-    return with_nominal(found, model, inputs, scaled, named, step=step, most=most)
-
-
-def with_nominal(
-    found: Fragility,
-    model: LinearSystem,
-    inputs: Mapping[str, FuzzyNumber],
-    records: Sequence[ScaledRecord],
-    limits: Mapping[str, Limit],
-    *,
-    step: float,
-    most: float,
-) -> Fragility:
-    """Return a fragility of damage states with the measures of the nominal structure.
-
-    The ends of measures over a cut belong to different structures under different records, so that
-    their scatter is that of none. The fragility is returned as it is if it has no states, or if
-    the cuts of its highest level contain one structure alone.
-
-    Args:
-        found: The fragility.
-        model: The structure.
-        inputs: Fuzzy parameters by name, in SI units.
-        records: The scaled records.
-        limits: Limits of the states by name.
-        step: Distance of the time nodes, in s.
-        most: Largest measure that is tried; see `fragility`.
-
-    Raises:
-        RefusedError, FailedError: As of `fragility`.
-    """
-    cuts = boxes(inputs, list(map(float, found.alpha)))
-    if not found.states or (cuts.lower[-1] == cuts.upper[-1]).all():
-        return found
-    nominal = {name: Crisp(value) for name, value in zip(cuts.names, cuts.nominal, strict=True)}
-    suite = None
-    increments = {}
-    if yields(model):
-        assert isinstance(model, StoreyFrame)
-        analyses = incremental_analyses(
-            model, nominal, records, limits, intensity=found.measure, most=most, step=step,
-            alpha=[1.0],
-        )  # fmt: skip
-        for name, analysis in analyses.items():
-            increments[name] = increments_of(analysis, limits)
-    else:
-        names = list(dict.fromkeys(limit.peak for limit in limits.values()))
-        peaks = {}
-        for record in records:
-            peaks[record.name] = record_peaks(
-                model, nominal, record, names, step=step, alpha=[1.0], progress=False
-            )
-        suite = summarised(model, nominal, records, peaks, step=step, alpha=[1.0])
-    of_nominal = fragility_of(
-        model, limits, intensity=found.measure, independent=False, alpha=[1.0], suite=suite,
-        increments=increments, states=found.states,
-    )  # fmt: skip
-    critical = {state: of_nominal.limits[state].critical for state in found.states}
-    return replace(found, nominal=critical)
+    question.require(model, components=1)
+    require_choice("intensity", intensity, MEASURES)
+    records = scaled_records(model, suite, duration=duration, step=step)
+    asked = Asked(model, inputs, tuple(alpha), duration, step, records=records)
+    asked = question.moved(asked, progress)
+    return question.answer(asked, lambda done: None)
 
 
 def events_of(limits: Mapping[str, Limit]) -> dict[str, list[str]]:
@@ -1020,61 +1029,6 @@ def events_of(limits: Mapping[str, Limit]) -> dict[str, list[str]]:
         if limit.event:
             events.setdefault(limit.event, []).append(name)
     return events
-
-
-def incremental_analyses(
-    model: StoreyFrame,
-    inputs: Mapping[str, FuzzyNumber],
-    records: Sequence[ScaledRecord],
-    limits: Mapping[str, Limit],
-    *,
-    intensity: str,
-    most: float,
-    step: float,
-    alpha: Sequence[float],
-) -> dict[str, IncrementalAnalysis]:
-    """Prepare an incremental dynamic analysis of a yielding frame for each record, by its name.
-
-    Nothing is moved along the scales yet. Each record is divided by its intensity, so that the
-    scale of an analysis is the intensity measure.
-
-    Args:
-        model: The frame.
-        inputs: Fuzzy parameters by name, in SI units.
-        records: Records with their intensity measures and the duration of their responses.
-        limits: Limits of magnitudes by name.
-        intensity: Name of the intensity measure: "Sa(T1)", "PGA" or "scale".
-        most: Largest measure that is tried, the same for all records, as a multiple of the measure
-            at which the nominal structure, if it were elastic, would reach all limits under all
-            records.
-        step: Step at which outputs are read, in s.
-        alpha: Levels, rising within [0, 1].
-
-    Raises:
-        RefusedError: `most` is not a positive number, levels or inputs are not allowed, or a
-            response does not exist.
-        StepError: A response has too many events in a step, or its energy is not in balance.
-    """
-    checked_number("most", most, positive=True)
-    names = list(limits)
-    pairs = [(limit.output, limit.number) for limit in limits.values()]
-    events = [[names.index(name) for name in members] for members in events_of(limits).values()]
-    cuts = boxes(inputs, alpha)
-    analyses = {}
-    for record in records:
-        # A record divided by its intensity has the intensity 1.
-        unit_samples = np.asarray(record.ground.samples / record.measures[intensity])
-        # A scaled record has no name and no remarks of its own.
-        frame = replace(model, ground=Accelerogram(record.ground.step, unit_samples))
-        analyses[record.name] = IncrementalAnalysis(
-            frame, cuts, pairs, record.duration, step, events=events
-        )
-    # All records are scaled up to the same measure. The first column of `elastic_scales` is the
-    # scale at which the frame yields; the others belong to the limits.
-    nominal = cuts.nominal[np.newaxis]
-    elastic = max(x.elastic_scales(nominal)[0, 1:].max() for x in analyses.values())
-    greatest = most * float(elastic)
-    return {name: replace(x, greatest_scale=greatest) for name, x in analyses.items()}
 
 
 def increments_of(
@@ -1098,87 +1052,6 @@ def increments_of(
     measure, demands = analysis.run(progress)  # (2, levels, limits and events, measures)
     names = [*limits, *events_of(limits)]
     return Increments(measure, {name: demands[:, :, k] for k, name in enumerate(names)})
-
-
-def fragility_of(
-    model: LinearSystem,
-    limits: Mapping[str, Limit],
-    *,
-    intensity: str,
-    independent: bool,
-    alpha: Sequence[float],
-    suite: SuitePeaks | None = None,
-    increments: Mapping[str, Increments] | None = None,
-    states: tuple[str, ...] = (),
-) -> Fragility:
-    """Return the fragility from the peaks over a suite, or from the increments of a yielding frame.
-
-    Args:
-        model: The structure.
-        limits: One-sided limits by name.
-        intensity: Name of the intensity measure.
-        independent: Whether the records are independent draws.
-        alpha: Levels.
-        suite: Peaks under each record. They are not needed if increments are given.
-        increments: Demands over the measure of each record, for a frame that yields.
-        states: Names of the damage states, from the slightest on; each limit has one as its event.
-
-    Raises:
-        RefusedError: States do not fit, see `require_states`.
-    """
-    if states:
-        require_states(states, limits)
-    events = events_of(limits)
-    demands = list((increments or {}).values())
-    critical: dict[str, CriticalMeasures] = {}
-    natures: dict[str, Nature] = {}
-    if demands:
-        for name in (*limits, *events):
-            critical[name] = CriticalMeasures.from_demands(demands, name)
-            natures[name] = Nature.ESTIMATED
-    elif suite is not None:
-        records = suite.by_record.values()
-        measures = [record.measures[intensity] for record in records]
-        for name, limit in limits.items():
-            peaks = [record.peak[limit.peak] for record in records]
-            critical[name] = CriticalMeasures.from_peaks(peaks, measures, limit.outwards)
-            natures[name] = Nature.weakest(peak.nature for peak in peaks)
-        for event, members in events.items():
-            # Critical measures of linear structures are intervals of numbers; the event is reached
-            # with the first of its limits.
-            critical[event] = CriticalMeasures.of_any([critical[member] for member in members])
-            natures[event] = Nature.weakest(natures[member] for member in members)
-
-    about: dict[str, LimitResult] = {}
-    for name, limit in limits.items():
-        about[name] = about_limit(limit, model.unit_of(limit.output))
-    for event, members in events.items():
-        for name in members:
-            about[name] = replace(about[name], event_name=event)
-        about[event] = LimitResult(output=event_words(event), is_event=True)
-    parts = {}
-    for name in about:
-        measure = _grid(critical[name], demands)
-        counts = critical[name].counts(measure)
-        if demands:
-            # The sets of measures of a yielding frame need not be intervals, so that they are
-            # counted one by one.
-            counts = counts_between(demands, name, measure)
-        parts[name] = _limit_fragility(
-            about[name], natures[name], critical[name], measure, counts, independent=independent
-        )
-    mode = nominal_mode(model)
-    return Fragility(
-        encloses=suite.encloses if suite is not None else "",
-        alpha=np.array(alpha, float),
-        measure=intensity,
-        unit=MEASURES[intensity],
-        period_s=mode.period,
-        damping_ratio=mode.ratio,
-        limits=parts,
-        increments=dict(increments or {}),
-        states=states,
-    )
 
 
 def _limit_fragility(

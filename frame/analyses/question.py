@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal
 
@@ -63,11 +63,13 @@ class Question(ABC):
     `reads_peaks`: the answer follows from the peaks of the outputs in `limits`.
     `needs_magnitudes`: each output has one limit, of its magnitude. `records`: whether a suite of
     records is refused beside it, allowed or needed; `all_angles`: whether their components may
-    come from all angles. `replaced`: fields that one field replaces, by its name. `of_yielding`:
+    come from all angles. `of_learned_set`: whether inputs may be learned from a measurement.
+    `replaced`: fields that one field replaces, by its name. `of_yielding`:
     fields that count where columns yield alone.
     """
 
     reads_peaks: ClassVar[bool] = False
+    of_learned_set: ClassVar[bool] = True
     needs_magnitudes: ClassVar[bool] = False
     records: ClassVar[Literal["refused", "allowed", "needed"]] = "refused"
     all_angles: ClassVar[bool] = True
@@ -88,3 +90,7 @@ class Question(ABC):
     @abstractmethod
     def answer(self, asked: Asked, progress: Progress) -> Answer:
         """Return the answer, calling `progress` with the completed fraction of the work."""
+
+    def further(self, asked: Asked, found: Answer) -> dict[str, Callable[[Progress], Answer]]:
+        """Return functions that compute what else follows from the answer, by its key."""
+        return {}
