@@ -66,7 +66,7 @@ def section_of(key: str, of: type) -> type[MadeSection]:
             keys[x.name] = (kind, Field(default, description=described[x.name]))
         elif default is not ...:
             keys[x.name] = (tuple[AnyLimit, ...], Field((), description=described[x.name]))
-    base = AnalysisSection if issubclass(of, Question) else MadeSection
+    base: type[MadeSection] = AnalysisSection if issubclass(of, Question) else MadeSection
     if "limits" in hints:
         base = QuestionSection
     made: type[MadeSection] = create_model(of.__name__, __base__=base, **keys)

@@ -1009,7 +1009,7 @@ def fragility(
     """
     question = FragilityQuestion(
         (limits,) if isinstance(limits, Limit) else tuple(limits),
-        dict(states or {}),
+        cast("Any", states or {}),
         cast("Any", intensity),
         independent,
         most,

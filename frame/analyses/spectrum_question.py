@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Literal, cast
+from typing import Annotated, ClassVar, Literal, cast
 
 import numpy as np
 
@@ -54,7 +54,7 @@ class SpectrumQuestion(CodeSpectrum, Question):
     """
 
     needs_magnitudes = True
-    records = "allowed"
+    records: ClassVar[Literal["refused", "allowed", "needed"]] = "allowed"
     of_learned_set = False
     fuzzy: tuple[str, ...]
     alpha: tuple[float, ...] = ALPHA
