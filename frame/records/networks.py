@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 from itertools import takewhile
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 from alphacut.base.arrays import Array
 from alphacut.base.stated import settled
@@ -31,57 +31,9 @@ from alphacut.frame.records.text_file import (
     require_step,
 )
 
-
-@dataclass(frozen=True)
-class _PeerHead:
-    """Number of samples (0 where it is not stated), their step in s, and the line of both."""
-
-    count: int
-    step: float
-    line: int
-    # The marks of PEER are looked for in so many first lines. Most heads have four; a larger number
-    # would find the marks in other formats' text.
-    max_lines: ClassVar[int] = 12
-
-    @classmethod
-    def of(cls, file: TextFile) -> _PeerHead:
-        """Return count and step of the samples in a file of type AT2 of PEER.
-
-        They are looked for in the first 12 lines. A line may say "NPTS= 4000, DT= .0050 SEC", "4000
-        .0050 NPTS, DT", or "DT= .0050 SEC" alone; the first such line counts.
-
-        Returns:
-            The head: `count`, the number of samples, 0 if it is not stated; `step`, in s; and
-            `line`, the index of their line, counted from 0.
-
-        Raises:
-            RefusedError: No line states the step, the step has another unit than seconds or a
-                decimal comma, or the count is 0 or no whole number.
-        """
-        real = r"(?P<step>[0-9]*\.?[0-9]+(?:[eEdD][-+]?[0-9]+)?)"
-        names_last = rf"(?P<count>[0-9]+)[\s,]+{real}[\s,]+NPTS\s*,?\s*DT\b"
-        names_first = rf"(?:NPTS\s*=?\s*(?P<count>[0-9]+)\s*[,;]?\s*)?\bDT\s*=?\s*{real}(?P<end>.*)"
-        head = file.lines[: cls.max_lines]
-        named = [k for k, line in enumerate(head) if re.search(r"\b(?:DT|NPTS)\b", line, re.I)]
-        line = named[0] if named else min(3, len(file.lines) - 1)
-        for row in named:
-            if match := re.search(names_last, head[row], re.I):
-                step = float(re.sub("[dD]", "e", match["step"]))
-                return cls(int(match["count"]), step, row)
-            match = re.search(names_first, head[row], re.I)
-            if match is None:
-                continue
-            line = row
-            is_complete = "NPTS" not in head[row].upper() or int(match["count"] or 0) > 0
-            # Behind the step may stand S, SEC or SECONDS, but no other unit and no decimals.
-            seconds = r"(?:(?:S|SEC|SECONDS?)\b)?(?![a-z]|,\d)"
-            is_in_seconds = re.match(seconds, match["end"].strip(), re.I)
-            if is_complete and is_in_seconds:
-                step = float(re.sub("[dD]", "e", match["step"]))
-                return cls(int(match["count"] or 0), step, row)
-        allowed = "a head with UNITS OF G and NPTS= 4000, DT= .0050 SEC, and as many numbers below"
-        cure = "write the count and the step in s, with a decimal point: NPTS= 4000, DT= .0050 SEC"
-        raise file.refusal(line, file.lines[line].strip(), allowed, cure)
+# The marks of PEER are looked for in so many first lines. Most heads have four; a larger number
+# would find the marks in other formats' text.
+PEER_LINES = 12
 
 
 def read_peer(file: TextFile, unit: str) -> Recording:
@@ -106,37 +58,51 @@ def read_peer(file: TextFile, unit: str) -> Recording:
             more or fewer than stated; the step is not from 4e-5 s to below 0.5 s; or the samples
             have another peak than the head.
     """
-    head = _PeerHead.of(file)
+    # Heads of 1999 have the names behind the numbers: "4000 .0050 NPTS, DT".
+    names_last = r"(?i)^\s*(\d+)[\s,]+([\d.]+(?:[ed][-+]?\d+)?)[\s,]+NPTS\s*,?\s*DT\b"
+    head = [re.sub(names_last, r"NPTS= \1, DT= \2", x) for x in file.lines[:PEER_LINES]]
+    file = replace(file, lines=(*head, *file.lines[PEER_LINES:]))
+    named = [k for k, text in enumerate(head) if re.search(r"(?i)\b(?:DT|NPTS)\b", text)]
+    timed = [k for k in named if re.search(r"(?i)\bDT\s*=?\s*[\d.]", head[k])]
+    line = (timed or named or [min(3, len(file.lines) - 1)])[0]
+    found = TextStatements.of(file, range(line + 1))
+    place = f"line {file.line_number(line)}"
+    steps = [stated.value for stated in found.steps if stated.place == place]
+    counts = [int(stated.value) for stated in found.counts if stated.place == place]
+    is_counted = bool(counts and counts[0] > 0) or "NPTS" not in file.lines[line].upper()
+    if not steps or not is_counted or re.search(r"\d,\d", file.lines[line]):
+        allowed = "a head with UNITS OF G and NPTS= 4000, DT= .0050 SEC, and as many numbers below"
+        cure = "write the count and the step in s, with a decimal point: NPTS= 4000, DT= .0050 SEC"
+        raise file.refusal(line, file.lines[line].strip(), allowed, cure)
+    step = steps[0]
     cure = "DT is in seconds: write 20 ms as DT= .0200 SEC"
-    require_step(file.location(head.line), head.step, cure)
-    found = TextStatements.of(file, range(head.line + 1))
+    require_step(file.location(line), step, cure)
     if found.quantities and not found.units:
-        what, line = found.quantities[0]
+        what, row = found.quantities[0]
         allowed = f"accelerations in {ACCELERATION_UNITS}"
         cure = f"this is {what}: take the file .AT2 of the acceleration"
-        raise file.refusal(line, file.lines[line].strip(), allowed, cure)
-    place = file.location(head.line)
+        raise file.refusal(row, file.lines[row].strip(), allowed, cure)
+    place = file.location(line)
     own_unit = settled(place, "unit", found.units)
-    text = own_unit.text if own_unit else unit
-    text = text.strip("()[] ")
-    line = head.line
+    text = (own_unit.text if own_unit else unit).strip("()[] ")
     if own_unit:
-        line = int(own_unit.place.removeprefix("line ")) - 1 - file.skipped
-    samples = file.numbers(head.line + 1, len(file.lines), count=head.count)
-    if head.count:
-        file.require_count(samples, head.count, head.line)
+        place = f"{file.name}, {own_unit.place}"
+    count = sum(counts[:1])
+    samples = file.numbers(line + 1, len(file.lines), count=count)
+    if count:
+        file.require_count(samples, count, line)
     component = ""
     pattern = r".*,\s*([\w-]+)\s*(?:\(.*\))?\s*"
-    if head.line > 1 and (title := re.fullmatch(pattern, file.lines[1])):
+    if line > 1 and (title := re.fullmatch(pattern, file.lines[1])):
         component = title[1]
     return recording_in_si(
-        file.location(line),
+        place,
         "PEER AT2",
         text,
-        head.step,
+        step,
         samples,
         component,
-        stated=peaks_in_text(file.lines[: head.line + 1], text),
+        stated=peaks_in_text(file.lines[: line + 1], text),
     )
 
 
@@ -418,7 +384,7 @@ FORMATS = (
             r".*(?:\bNPTS\b.*\bDT\b|\bPEER\b.*\b(?:DATABASE|RECORD)\b)",
             re.IGNORECASE,
         ),
-        _PeerHead.max_lines,
+        PEER_LINES,
         read_peer,
     ),
 )

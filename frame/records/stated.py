@@ -36,6 +36,7 @@ _SPELLED = {
     r"(?<=\bacc)(\w*\.?)\s*/\s*\(": r"\1 (",
     r"\blengths?\W+(?:units?\W+|in\W+)?([cm]?m|in|ft)\b(?=.*\btimes?\W.*\bs(?:ec)?\b)": r"\1/s^2",
 }
+_SPELLED_WORDS = re.compile("|".join(_SPELLED), re.IGNORECASE)
 # A unit of acceleration that cannot be something else; not part of a quotient such as V/(m/s^2).
 _UNIT = (
     rf"(?<![a-z0-9/])(?<!/\()(?:{PER_SECOND_SQUARED}|{'|'.join(GALS)}|milli-?g|mg|%\s?g"
@@ -96,8 +97,9 @@ class TextStatements:
         found = cls()
         for row in lines:
             text = file.lines[row]
-            for pattern, symbol in _SPELLED.items():
-                text = re.sub(pattern, symbol, text, flags=re.IGNORECASE)
+            if _SPELLED_WORDS.search(text):  # few lines have any, and one search is quicker
+                for pattern, symbol in _SPELLED.items():
+                    text = re.sub(pattern, symbol, text, flags=re.IGNORECASE)
             # As "1/100 sec".
             text = re.sub(r"\b1/(\d{2,5})(?=\s*s)", lambda x: f"{1 / int(x[1]):.9g}", text)
             place = f"line {file.line_number(row)}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import ceil, isfinite, nan
 from pathlib import Path
@@ -64,8 +65,10 @@ class TextFile:
         lines = re.split(r"\r\n|\r|\n", decoded(content))
         first = next((k for k, line in enumerate(lines) if line.strip()), 0)
         # A spreadsheet may put separators of empty cells behind the quotes.
-        unquoted = (re.sub(r'^"([^"]*)"[,;\s]*$', r"\1", line) for line in lines[first:])
-        file = cls(name, tuple(unquoted), skipped=first)
+        lines = lines[first:]
+        if b'"' in content:
+            lines = [re.sub(r'^"([^"]*)"[,;\s]*$', r"\1", line) for line in lines]
+        file = cls(name, tuple(lines), skipped=first)
         # Searches in a line take the square of its length; formats have about 80 letters a line.
         length, longest = max((len(line), number) for number, line in enumerate(file.lines))
         if length > 10_000:
@@ -99,8 +102,13 @@ class TextFile:
         Raises:
             RefusedError: A word is no finite number.
         """
-        # The loop goes over words, and not over whole lines by NumPy, since a message names the
-        # line and the word that is wrong.
+        text = "\n".join(self.lines[first:last])
+        if not width and not re.search(r"[^-+.0-9eE\s]", text):
+            with suppress(ValueError):  # of words such as 1-2, which are named below
+                found = np.array(text.split(), float)
+                if np.isfinite(found).all():
+                    return found
+        # The loop goes over words, since a message names the line and the word that is wrong.
         values: list[float] = []
         for row in range(first, min(last, len(self.lines))):
             words = words_of(self.lines[row], width)
