@@ -10,6 +10,21 @@ from alphacut.base.errors import require
 from alphacut.base.stated import LENGTHS, METRES, Stated, settled
 
 _UNITS = "|".join(sorted(METRES, key=len, reverse=True))
+_NUMBER = r"(\d+\.?\d*(?:e[-+]?\d+)?|\.\d+)"
+# Sides of voxels, as "voxel size 2 x 2 x 5 um", "pixel: 2 um" or "slice thickness = 5 um".
+_SIDES = (
+    r"(slice|layer|section|\bz)?s?[\s_-]*(vox|pix|spac|resol|thick|isotrop|every|step)"
+    rf"(?:(?!slice|layer|section|\bz\b)[^\d\n]){{0,40}}{_NUMBER}"
+    rf"(?:\s*(?:[x×,;*]|\s)\s*{_NUMBER}\s*[x×,;*\s]\s*{_NUMBER})?\s*[\[(]?({_UNITS})(?![a-z])"
+)
+_REWRITTEN = {
+    # "2 um/pixel", and the unit before the numbers: "spacing (um): 2 2 5", "voxel_um: [2, 2, 5]".
+    rf"({_NUMBER}\s*(?:{_UNITS}))\s*(?:/|per)\s*(vox|pix)\w*": r"\3: \1",
+    rf"[\[(_]({_UNITS})[\])\"']*\s*[:=]?\s*[\[(]*({_NUMBER}(?:[\s,;x×*]+{_NUMBER}){{0,2}})": (
+        r" \2 \1"
+    ),
+    r"vox(?:el)?[\s_]*depth": "slice spacing",
+}
 
 
 def require_spacing(
@@ -61,20 +76,16 @@ def require_spacing(
     are_alike = all(math.isclose(stated[k] * factors[k], expected[k], rel_tol=0.01) for k in known)
     cure = "give the voxel as it is"
     require(are_alike, name, f"voxels of {shown} along x, y, z", shown_sides, cure)
-    number = r"(\d+\.?\d*(?:e[-+]?\d+)?|\.\d+)"
-    further = rf"(?:\s*(?:[x×,;*]|\s)\s*{number}\s*[x×,;*\s]\s*{number})?"
-    words = r"(slice|layer|section|\bz)?s?[\s_-]*(vox|pix|spac|resol|thick|isotrop|every|step)"
-    filling = r"(?:(?!slice|layer|section|\bz\b)[^\d\n]){0,40}"
-    pattern = rf"{words}{filling}{number}{further}\s*[\[(]?({_UNITS})\b"
     for text in texts:
-        # As "2 um/pixel".
-        text = re.sub(rf"({number}\s*(?:{_UNITS}))\s*(?:/|per)\s*(vox|pix)\w*", r"\3: \1", text)
-        for match in re.finditer(pattern, text, re.IGNORECASE):
+        for said, written in _REWRITTEN.items():
+            text = re.sub(said, written, text, flags=re.IGNORECASE)
+        for match in re.finditer(_SIDES, text, re.IGNORECASE):
             axis_word, what, first, second, third, unit = match.groups()
             lengths = [first, second or first, third or first][: len(expected)]
             for axis, (length, side) in enumerate(zip(lengths, expected, strict=True)):
                 # Slices lie along z, and a pixel lies in a slice.
-                if axis < 2 if axis_word else axis == 2 and what.lower() == "pix" and not third:
+                is_of_pixel = axis_word is None and what.lower() == "pix" and third is None
+                if (axis_word and axis < 2) or (is_of_pixel and axis == 2):
                     continue
                 own = Stated(METRES[unit.lower()] * float(length), match[0])
                 said = Stated(side, f"of {side:g} m along {'xyz'[axis]}")

@@ -454,6 +454,10 @@ def test_units_of_single_axes_are_compared_and_may_be_overridden(tmp_path, rng):
         ("mhd", "Comment = pixel size: 2 um, z step: 5 um", (2, 2, 5)),
         ("nrrd", "voxelsize:=2.0 2.0 5.0 µm", (2, 2, 5)),
         ("nrrd", "content: scan at 5 µm/voxel", (5, 5, 5)),
+        ("nrrd", "# spacing (um): 2 2 5", (2, 2, 5)),
+        ("nrrd", "# voxels of 0.002*0.002*0.005 mm3", (2, 2, 5)),
+        ("nrrd", 'content: {"voxel_size_um": [2, 2, 5]}', (2, 2, 5)),
+        ("mhd", "Comment = PixelWidth=2 um PixelHeight=2 um VoxelDepth=5 um", (2, 2, 5)),
         (
             "nrrd",
             'centerings: node node node\naxis mins: 0 0 0\naxis maxs: 12 8 55\nunits: "um" "um" "um"',
