@@ -77,8 +77,8 @@ def require_spacing(
     cure = "give the voxel as it is"
     require(are_alike, name, f"voxels of {shown} along x, y, z", shown_sides, cure)
     for text in texts:
-        for said, written in _REWRITTEN.items():
-            text = re.sub(said, written, text, flags=re.IGNORECASE)
+        for pattern, written in _REWRITTEN.items():
+            text = re.sub(pattern, written, text, flags=re.IGNORECASE)
         for match in re.finditer(_SIDES, text, re.IGNORECASE):
             axis_word, what, first, second, third, unit = match.groups()
             lengths = [first, second or first, third or first][: len(expected)]
