@@ -154,11 +154,9 @@ WITH_PEAK = {
         "PEAK VELOCITY = 900.1 CM/SEC AT 1.3 SEC\n", 1),
     "CSMIP V1": lambda f: csmip(False, ("1: 90 Deg",), "g/10", raw=True).replace(
         "AND g/10", f"AND G/10.   MAX  = {f * PEAK:7.3f} G, AT  0.180 SEC"),
-    "SMC text": lambda f: smc().replace("*\n", f"*   pk acc = {f * PEAK * 100 * G:.3e}\n", 1),
     "SMC largest": lambda f: smc_with_peak(f, 30),
     "SMC least": lambda f: smc_with_peak(f, 32),
     "CSV": lambda f: f"# PGA = {f * PEAK * 1000:.2f} mg\n" + csv_text(),
-    "CSV max": lambda f: f"# max acc [gal]: {f * PEAK * 100 * G:.2f}\n" + csv_text("m/s^2"),
 }  # fmt: skip
 """A file of each format by the factor of the true peak that its head states."""
 
