@@ -60,9 +60,8 @@ from alphacut.frame.analyses.question import Asked, Question
 from alphacut.frame.analyses.suites import (
     MEASURES,
     nominal_mode,
-    record_peaks,
+    peaks_under,
     scaled_records,
-    summarised,
 )
 from alphacut.frame.boxes import ALPHA, boxes
 from alphacut.frame.records.history import Accelerogram
@@ -496,23 +495,22 @@ class FragilityQuestion(Question):
         frames that yield are moved at many scales.
         """
         limits = self.named_limits
-        count = len(asked.records)
         if yields(asked.model):
             increments = {}
             for k, (name, analysis) in enumerate(self.analyses(asked).items()):
-                tick = nth_subprogress(progress, k, count)
+                tick = nth_subprogress(progress, k, len(asked.records))
                 increments[name] = increments_of(analysis, limits, tick)
             return replace(asked, increments=increments)
-        model = cast("LinearSystem", asked.model)
-        names = list(dict.fromkeys(limit.peak for limit in limits.values()))
-        times: dict[str, Any] = {"step": asked.step, "alpha": asked.alpha}
-        peaks = {}
-        for k, record in enumerate(asked.records):
-            tick = nth_subprogress(progress, k, count)
-            peaks[record.name] = record_peaks(
-                model, asked.inputs, record, names, progress=tick, **times
-            )
-        return replace(asked, suite=summarised(model, asked.inputs, asked.records, peaks, **times))
+        peaks = peaks_under(
+            cast("LinearSystem", asked.model),
+            asked.inputs,
+            asked.records,
+            list(dict.fromkeys(limit.peak for limit in limits.values())),
+            step=asked.step,
+            alpha=asked.alpha,
+            progress=progress,
+        )
+        return replace(asked, suite=peaks)
 
     def answer(self, asked: Asked, progress: Progress) -> Fragility:
         """Return the fragility, for which all but the nominal responses are known."""

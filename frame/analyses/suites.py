@@ -518,6 +518,20 @@ def over_records(
         all_angles=all_angles,
     )
     names = tuple(names) or tuple(map(str, model.outputs))
+    return peaks_under(model, inputs, records, names, step=step, alpha=alpha, progress=progress)
+
+
+def peaks_under(
+    model: LinearSystem,
+    inputs: Mapping[str, FuzzyNumber],
+    records: Sequence[ScaledRecord],
+    names: Sequence[str],
+    *,
+    step: float,
+    alpha: Sequence[float],
+    progress: Progress | None,
+) -> SuitePeaks:
+    """Return the peaks with some names under each of some scaled records; see `over_records`."""
     found = {}
     for k, record in enumerate(records):
         tick = nth_subprogress(progress, k, len(records))
