@@ -8,9 +8,8 @@ import pytest
 
 from alphacut import main
 from alphacut.case.content import load
-from alphacut.frame import MatrixStructure, over_records, read_record
+from alphacut.frame import over_records, read_record
 from alphacut.frame.analyses.angles import turned_components
-from alphacut.fuzzy import Interval
 from alphacut.stages.suite import suite_records
 from tests.alphacut.small import refusals, summary_of
 
@@ -77,20 +76,10 @@ def test_a_case_over_all_angles_gives_the_bounds_of_python_and_their_angles(tmp_
     assert main(["run", str(path), "--out", str(out), "--no-figures"]) == 0
     printed = capsys.readouterr().out
     summary = summary_of(out)
-    model = MatrixStructure(
-        {"k": 1.0, "zeta": 0.05},
-        mass=[(1.0, MASS)],
-        stiffness=[("k", STIFFNESS)],
-        observed={"corner": np.array([1.0, 0.0, -4.0])},
-        ratios=["zeta"],
-        pattern=np.eye(3)[0],
-        components=[(None, np.eye(3)[1])],
-    )
+    structure = load(path).content.structure
     pair = [read_record(tmp_path / f"{name}.csv") for name in ("one", "two")]
-    found = over_records(
-        model, {"k": Interval(0.96, 1.04)}, [pair], duration=2.0, step=0.02, alpha=[0, 1],
-        all_angles=True,
-    )  # fmt: skip
+    motion = {"duration": 2.0, "step": 0.02, "alpha": [0, 1], "all_angles": True}
+    found = over_records(structure.model, structure.inputs(["k"]), [pair], **motion)
     expected = found.by_record["one+two"].peak["corner"]
     peak = summary["records"]["by_record"]["one+two"]["peak"]["corner"]
     assert peak["upper"] == pytest.approx(expected.upper)

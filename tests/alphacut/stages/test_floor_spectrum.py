@@ -47,76 +47,58 @@ def written(folder, text=CASE):
     return path
 
 
-def test_a_case_has_the_answer_of_the_function_with_its_figure_and_table(tmp_path, capsys):
-    case, out = written(tmp_path), tmp_path / "out"
+def run(folder, text):
+    """The answer to a case that is run, its content, and the lines and title of its figure."""
+    case, out = written(folder, text), folder / "out"
     assert main(["run", str(case), "--out", str(out)]) == 0
-    assert "floor_spectrum: a1, T = 0.3 s: ≤" in capsys.readouterr().out
     found = from_document(FloorSpectrum, summary_of(out)["floor_spectrum"])
-    structure = load(case).content.structure
-    expected = floor_spectrum(
-        structure.model, structure.inputs(["k1"]), "a1", [0.0, 0.3], 0.05,
-        duration=1.5, step=0.02, alpha=[0, 1], progress=False,
-    )  # fmt: skip
-    assert found.bound == pytest.approx(expected.bound, rel=1e-9)
-    assert found.natures == expected.natures == (("guaranteed", "guaranteed"),)
-
-    assert (out / "figures/floor_spectrum.png").exists()
     with figure_style():
         (axes,) = draw_floor_spectrum(found).axes
     lines = {line.get_label(): line.get_ydata() * 9.80665 for line in axes.lines}
-    assert lines["bound, α = 0"] == pytest.approx(found.bound[0, 0])
-    assert lines["nominal"] == pytest.approx(found.nominal[0])
-
-    assert main(["report", str(out), "--csv", str(tmp_path / "csv")]) == 0
-    rows = pd.read_csv(tmp_path / "csv/floor_spectrum.csv")
-    assert rows["period [s]"].tolist() == [0.0, 0.3] * 2
-    assert (rows["attained [m/s^2]"] <= rows["bound [m/s^2]"]).all()
+    return found, load(case).content, lines, axes.get_title(loc="left")
 
 
-def test_several_dampings_share_a_figure_and_the_terminal_has_their_table(tmp_path, capsys):
-    text = CASE.replace("[0, 1]", "[0]") + 'damping = ["2 %", "5 %"]\n'
-    case, out = written(tmp_path, text), tmp_path / "out"
-    assert main(["run", str(case), "--out", str(out)]) == 0
+def by_function(content, damping=0.05, **motion):
+    structure = content.structure
+    options = {"duration": 1.5, "step": 0.02, "alpha": [0, 1], "progress": False} | motion
+    inputs = structure.inputs(["k1"])
+    return floor_spectrum(structure.model, inputs, "a1", [0.0, 0.3], damping, **options)
+
+
+def test_a_case_has_the_answer_of_the_function_with_its_figure_and_table(tmp_path, capsys):
+    """Each damping ratio has the answer that it has alone, and they share a figure."""
+    found, content, lines, _ = run(tmp_path, CASE + 'damping = ["2 %", "5 %"]\n')
     shown = capsys.readouterr().out
-    found = from_document(FloorSpectrum, summary_of(out)["floor_spectrum"])
     assert (found.outputs, found.damping) == (("a1", "a1"), (0.02, 0.05))
-    structure = load(case).content.structure
     for k, ratio in enumerate(found.damping):
-        alone = floor_spectrum(
-            structure.model, structure.inputs(["k1"]), "a1", [0.0, 0.3], ratio,
-            duration=1.5, step=0.02, alpha=[0], progress=False,
-        )  # fmt: skip
+        alone = by_function(content, ratio)
         for name in ("bound", "attained", "nominal"):
             values = getattr(found, name)[..., k, :]
             assert values == pytest.approx(getattr(alone, name)[..., 0, :], rel=1e-9)
-        assert found.natures[k] == alone.natures[0]
+        assert found.natures[k] == alone.natures[0] == ("guaranteed", "guaranteed")
+        assert lines[f"bound, α = 0, ζ = {ratio}"] == pytest.approx(found.bound[0, k])
         for period in ("0 s", "0.3 s"):
             assert f"floor_spectrum: a1, T = {period}, ζ = {ratio}: ≤" in shown
-    with figure_style():
-        (axes,) = draw_floor_spectrum(found).axes
-    lines = {line.get_label(): line.get_ydata() * 9.80665 for line in axes.lines}
-    for k, ratio in enumerate(found.damping):
-        assert lines[f"bound, α = 0, ζ = {ratio}"] == pytest.approx(found.bound[0, k])
+    out = tmp_path / "out"
+    assert (out / "figures/floor_spectrum.png").exists()
+    assert main(["report", str(out), "--csv", str(tmp_path / "csv")]) == 0
+    rows = pd.read_csv(tmp_path / "csv/floor_spectrum.csv")
+    assert rows["period [s]"].tolist() == [0.0, 0.3] * 4
+    assert (rows["attained [m/s^2]"] <= rows["bound [m/s^2]"]).all()
 
 
-def test_a_suite_of_records_has_mean_spectra(tmp_path):
+def test_a_suite_of_records_has_mean_spectra(tmp_path, capsys):
     text = CASE.replace(RECORD, '[records]\nfiles = ["record.csv", "other.csv"]\n')
-    case, out = written(tmp_path, text), tmp_path / "out"
-    assert main(["run", str(case), "--out", str(out), "--quiet"]) == 0
-    found = from_document(FloorSpectrum, summary_of(out)["floor_spectrum"])
+    found, content, lines, title = run(tmp_path, text)
+    assert "floor_spectrum: a1, T = 0.3 s: ≤" in capsys.readouterr().out
     assert found.suite == ("record", "other")
-    content = load(case).content
-    structure = content.structure
-    records = suite_records(content.records, content.envelope, structure)
-    expected = floor_spectrum(
-        structure.model, structure.inputs(["k1"]), "a1", [0.0, 0.3], 0.05,
-        records=[x.components for x in records], duration=max(x.duration for x in records),
-        step=0.02, alpha=[0, 1], progress=False,
-    )  # fmt: skip
+    records = suite_records(content.records, content.envelope, content.structure)
+    durations, grounds = [x.duration for x in records], [x.components for x in records]
+    expected = by_function(content, records=grounds, duration=max(durations))
     assert found.bound == pytest.approx(expected.bound, rel=1e-9)
-    with figure_style():
-        (axes,) = draw_floor_spectrum(found).axes
-    assert axes.get_title(loc="left").endswith("of the mean over 2 records")
+    assert lines["bound, α = 0"] == pytest.approx(found.bound[0, 0])
+    assert lines["nominal"] == pytest.approx(found.nominal[0])
+    assert title.endswith("of the mean over 2 records")
 
 
 def test_periods_are_given_by_their_range(tmp_path):

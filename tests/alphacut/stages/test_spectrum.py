@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 
 from alphacut import main
+from alphacut.case.content import load
 from alphacut.frame import (
     Limit,
-    StoreyFrame,
     eurocode8_spectrum,
     spectrum_checks,
     spectrum_response,
 )
-from alphacut.fuzzy import Interval, Triangular
 from tests.alphacut.small import refusals, summary_of, summary_of_run, written
 
 ROOT = Path(__file__).parents[3]
@@ -54,14 +53,9 @@ def test_a_case_has_the_peaks_and_verdicts_of_the_python_interface(tmp_path):
     folder = tmp_path / "out"
     assert main(["run", str(case), "--quiet", "--out", str(folder)]) == 0
     summary = summary_of(folder)
-    frame = StoreyFrame(
-        masses=[5e4] * 3,
-        lengths=[3.5, 3.0, 3.0],
-        stiffness=[9e7, 8e7, 7e7],
-        damping_ratio=0.05,
-        outputs=("drift1", "shear1", "drift2", "drift3", "base_shear"),
-    )
-    inputs = {"k1": Interval(8.1e7, 9.9e7), "m3": Triangular(4.5e4, 5e4, 6e4)}
+    structure = load(case).content.structure
+    frame = structure.model.with_outputs(("drift1", "shear1", "drift2", "drift3", "base_shear"))
+    inputs = structure.inputs(["k1", "m3"])
     design = eurocode8_spectrum(0.25 * 9.80665, "C", q=3.9)
     found = spectrum_response(frame, inputs, design, alpha=[0.0, 1.0])
     peaks = summary["response_spectrum"]
