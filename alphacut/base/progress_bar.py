@@ -152,6 +152,8 @@ class _Display:
         written: Time of the last display.
         fraction: Completed fraction, 0 to 1.
         end_of_stage: Time at which the present stage is foretold to end.
+        told_until: Time until which that is said, unless a further fraction comes: two thirds of
+            the way to the end, for a stage that stands still is not about to end.
         turn: Held by the thread that shows.
         ended: Set by `close`.
     """
@@ -162,7 +164,7 @@ class _Display:
         self.begun = monotonic()
         self.written = self.begun
         self.fraction = 0.0
-        self.end_of_stage = self.begun
+        self.end_of_stage = self.told_until = self.begun
         self.turn = threading.Lock()
         self.ended = threading.Event()
         threading.Thread(target=self._repeat, daemon=True).start()
@@ -179,10 +181,13 @@ class _Display:
         """
         time_left = ""
         if isinstance(fraction, Foretold) and fraction.seconds_left is not None:
+            now = monotonic()
             if fraction is not self.fraction:
-                self.end_of_stage = monotonic() + fraction.seconds_left
-            seconds = max(self.end_of_stage - monotonic(), 1.0)
-            time_left = f"some {seconds:.0f} s left of this stage"
+                self.end_of_stage = now + fraction.seconds_left
+                self.told_until = now + 2 * fraction.seconds_left / 3
+            if now <= self.told_until:
+                seconds = max(self.end_of_stage - now, 1.0)
+                time_left = f"some {seconds:.0f} s left of this stage"
         self.fraction = fraction
         self._show(time_left, on_terminal="")
 

@@ -123,7 +123,7 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
             axis.loglog(*zip(*points, strict=True), "o-", color=f"C{place}", label=label)
         axis.grid(alpha=0.3)
     axes[0].set(xlabel="motions computed (Proof bounds without any)", ylabel="largest error in m")
-    axes[1].set_xlabel("time in s")
+    axes[1].set_xlabel("time of the clock in s")
     figure.suptitle("Envelope of the paper's frame, four fuzzy inputs, 30 s: error of each method")
     axes[1].legend(fontsize=9, loc="lower left")
     for ending in (".svg", ".png"):

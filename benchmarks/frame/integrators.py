@@ -72,6 +72,8 @@ def draw(rows: list[dict[str, Any]], drifts: dict[str, Array], steps: int, path:
     for axis in axes:
         axis.grid(alpha=0.3)
     axes[1].legend(fontsize=9)
+    error = "error of displacements (the exact propagator has none)"
+    figure.suptitle(f"The paper's frame: {error}, energy undamped")
     for ending in (".svg", ".png"):
         figure.savefig(path.with_suffix(ending), dpi=150)
 

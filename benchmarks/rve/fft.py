@@ -12,7 +12,6 @@ proved sides take more than 8 times the processor time of FFT.
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import sys
 from collections.abc import Callable
@@ -50,7 +49,6 @@ def measured(call: Callable[[], T]) -> tuple[T, Cost]:
     """Return what a call returns, and its price."""
     status = Path("/proc/self/status")
     gc.collect()
-    ctypes.CDLL(None).malloc_trim(0)  # what earlier calls freed is given back to the system
     Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
     lines = dict(line.split(":", 1) for line in status.read_text().splitlines())
     before = int(lines["VmRSS"].split()[0])

@@ -62,6 +62,22 @@ def test_lines_go_on_while_nothing_is_reported(monkeypatch, capsys):
     assert capsys.readouterr().err == ""
 
 
+def test_a_stage_that_stands_still_is_not_said_to_end_soon(monkeypatch, capsys):
+    # A second of the clock of the display is a fiftieth of a second here: lines are 8 s apart.
+    begun = time.monotonic()
+    monkeypatch.setattr(
+        "alphacut.base.progress_bar.monotonic", lambda: 50 * (time.monotonic() - begun)
+    )
+    monkeypatch.setattr("alphacut.base.progress_bar.REPEAT", 0.02)
+    with progress_reporter(None) as report:
+        report(Foretold(0.3, 60.0))
+        time.sleep(3.0)
+    lines = capsys.readouterr().err.splitlines()
+    left = [float(line.split()[5]) for line in lines if "left" in line]
+    assert 20.0 <= min(left) <= max(left) <= 60.0
+    assert "left" not in lines[-1]
+
+
 def foretold(course, monkeypatch):
     """The times left that are told in a course of (work, fraction), and those that are right."""
     clock = [0.0]
