@@ -6,7 +6,8 @@ A disc of radius 1/2 in a square cell [−1, 1]², the same at all θ, contrast 
 the largest relative one of C11 + C12, C11 − C12 and C33, against the series; of bounds it is that
 of the worse bound, and of pixels it includes that of the staircase. Processor time is the median of
 five calls where one takes less than 5 s, without imports, compilation and Gmsh, and with grids set
-up anew. A line ends before a call that would pass the cap. Memory is by how much the process grew.
+up anew. A line ends before a call that would pass the cap. Each way has a process of its own, and
+memory is by how much that grew.
 
 Plain DOLFINx is what its users write for this plane problem: quadratic triangles with curved sides,
 periodic partners eliminated, MUMPS or conjugate gradients with GAMG.
@@ -17,10 +18,12 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from importlib.util import find_spec
+from multiprocessing import get_context
 from pathlib import Path
 from statistics import median
 from time import perf_counter
@@ -308,25 +311,33 @@ def ways(folder: Path) -> dict[str, list[tuple[str, Way]]]:
     return lines
 
 
-def points(names: Sequence[str], longest: float) -> Iterator[Point]:
-    """Yield all points; a line ends before a call that would take longer than `longest` seconds."""
+def points(way: str, longest: float) -> list[Point]:
+    """Return and print all points of a way.
+
+    Its line ends before a call that would take longer than `longest` seconds.
+    """
+    found = []
     [exact] = SeriesModel(points=2, accuracy=1e-12).solve(DISC, MATRIX, [PARTICLE])
     right = exact.moduli
     with tempfile.TemporaryDirectory() as folder:
-        for way, settings in ways(Path(folder)).items():
-            if names and way not in names:
-                continue
-            settings[0][1]()  # compiles
-            for setting, call in settings:
-                found, cost = fft.measured(call)
-                errors = [abs(square_moduli(C) / right - 1).max() for C in found.stiffness]
-                repeats = REPEATS - 1 if cost.seconds < QUICK else 0
-                again = [fft.measured(call)[1].seconds for _ in range(repeats)]
-                seconds = median([cost.seconds, *again])
-                error = max(*errors, 1e-15)
-                yield Point(way, setting, error, seconds, found.unknowns, cost.megabytes)
-                if 4 * seconds > longest:
-                    break
+        settings = ways(Path(folder))[way]
+        settings[0][1]()  # compiles
+        for setting, call in settings:
+            solved, cost = fft.measured(call)
+            errors = [abs(square_moduli(C) / right - 1).max() for C in solved.stiffness]
+            repeats = REPEATS - 1 if cost.seconds < QUICK else 0
+            again = [fft.measured(call)[1].seconds for _ in range(repeats)]
+            seconds = median([cost.seconds, *again])
+            error = max(*errors, 1e-15)
+            found.append(Point(way, setting, error, seconds, solved.unknowns, cost.megabytes))
+            print(
+                f"{way:24} {setting:16} error {error:8.1e} {seconds:8.3f} s"
+                f" {solved.unknowns:8} unknowns {cost.megabytes:6.0f} MB",
+                flush=True,
+            )
+            if 4 * seconds > longest:
+                break
+    return found
 
 
 def draw(found: Sequence[Point], stem: Path) -> None:
@@ -377,14 +388,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=RESULTS)
     options = parser.parse_args(arguments)
     started = perf_counter()
-    found = []
-    for point in points(options.only, options.longest):
-        found.append(point)
-        print(
-            f"{point.way:24} {point.setting:16} error {point.error:8.1e} {point.seconds:8.3f} s"
-            f" {point.unknowns:8} unknowns {point.megabytes:6.0f} MB",
-            flush=True,
-        )
+    with tempfile.TemporaryDirectory() as folder:
+        names = options.only or list(ways(Path(folder)))
+    found: list[Point] = []
+    for way in names:
+        with ProcessPoolExecutor(1, get_context("spawn")) as apart:
+            found += apart.submit(points, way, options.longest).result()
     options.out.mkdir(parents=True, exist_ok=True)
     write([asdict(point) for point in found], options.out / "one_shape.csv")
     draw(found, options.out / "one_shape")
