@@ -23,6 +23,7 @@ COMMANDS = {
     "benchmarks/results/one_shape.png": "python -m benchmarks.rve.one_shape",
     "benchmarks/results/costs.png": "python -m benchmarks.costs",
     "benchmarks/results/frame_envelopes.png": "python -m benchmarks.frame.envelopes",
+    "benchmarks/results/frame_integrators.png": "python -m benchmarks.frame.integrators",
     "benchmarks/results/mesh_bounds.png": "python -m benchmarks.rve.mesh_bounds --seed 4131833150",
     "benchmarks/results/voxels.png": "python -m benchmarks.rve.voxels --chart",
     "cases/composite.png": "python cases/make_composite.py",

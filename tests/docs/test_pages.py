@@ -15,7 +15,6 @@ from tests.alphacut.small import replaced
 ROOT = Path(__file__).parents[2]
 DEAR = ("bone", "mesh_bounds", "own_law_and_outline", "product_space_cell", "rock")  # demos
 QUICKER = {
-    "bone": {"(24, 16, 16)": "(12, 8, 8)"},
     "data": {"range(1000)": "range(20)"},
     "random_inputs": {"random_base2(8)": "random_base2(4)"},
     "rock": {"SIDE = 20": "SIDE = 10"},
