@@ -26,12 +26,12 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.errors import RefusedError
+from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.structure import parameter_models
 from alphacut.frame.structures.linear import LinearSystem
 
-UNIT_ROUNDOFF = 2.0**-53
 AFFINE = 1e-11
 """Remainder, as a fraction of the largest entry, up to which a function of the parameters counts as
 affine: it is rounding then, some hundred units."""
@@ -136,6 +136,8 @@ def affine_model(
     n = len(full.pattern)
     rows = (full.row_factors[:, None] * full.rows)[:, :n]
     blocks = concatenate([full.stiffness, static, rows.T], -1)
+    # Rounding of an entry, here and in sub-boxes, is some units for each of a few dozen operations.
+    blocks = blocks.widened(64 * UNIT_ROUNDOFF * blocks.magnitude())
     magnitudes = [_magnitude(x) for x in blocks.homogeneous_part(1)[:, :, :n]]
     return AffineModel(blocks, np.array(magnitudes).reshape(-1, n, n))
 

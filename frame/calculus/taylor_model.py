@@ -4,10 +4,10 @@ A Taylor model stands for functions f(u) of inputs u in [−1, 1]^d: |f(u) − p
 u of the box, p a polynomial (Makino, Berz 2003). Sums, products, powers and solutions of linear
 systems of Taylor models are Taylor models.
 
-Three errors go into the remainder. Terms of a product above the order kept are bounded by the sums
+Two errors go into the remainder. Terms of a product above the order kept are bounded by the sums
 of the magnitudes of the coefficients of its factors. The Taylor series of a power is bounded by
-Lagrange's remainder, with the derivative of the next order. The rounding of n operations is bounded
-by γ_n = n u / (1 − n u), u the unit roundoff (Higham 2002, section 3.1).
+Lagrange's remainder, with the derivative of the next order. Rounding is not in it: bounds hold in
+exact arithmetic, and have a margin where they are used.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations_with_replacement
-from math import comb
 from typing import Any
 
 import numpy as np
@@ -34,7 +33,6 @@ from alphacut.frame.calculus.monomials import (
     product_part,
     zero_part,
 )
-from alphacut.frame.calculus.rounding import COMPLEX_ROUNDINGS, UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.unproved import UnprovedError
 
 # Order of a Taylor model unless another is given (tuned). A higher one has a smaller remainder, and
@@ -53,8 +51,7 @@ class TaylorModel:
         parts: Homogeneous parts of the polynomials by degree 0, 1, …: coefficients of shape
             (monomials of that degree, *V), real or complex, in the order of
             `monomials.monomials`. Parts of higher degrees are zero.
-        remainder: Bound of |f(u) − p(u)| over the box, with the rounding of the coefficients,
-            shape V, not negative.
+        remainder: Bound of |f(u) − p(u)| over the box, shape V, not negative.
         inputs: Number d of inputs.
         order: Degree above which products move their terms into the remainder.
     """
@@ -77,8 +74,7 @@ class TaylorModel:
     def variables(cls, centre: Array, radius: Array, order: int = ORDER) -> TaylorModel:
         """Return the d functions centre_i + radius_i u_i of inputs u in [−1, 1]^d.
 
-        These are the uncertain parameters over a box. The remainder covers the rounding of the
-        product and of the sum.
+        These are the uncertain parameters over a box.
 
         Args:
             centre: Midpoints, shape (d,).
@@ -90,8 +86,7 @@ class TaylorModel:
         """
         constant_part = np.asarray(centre, float)[None]
         linear_part = np.diag(np.asarray(radius, float))
-        rounding = gamma(2) * (np.abs(centre) + radius)
-        return cls((constant_part, linear_part), rounding, len(centre), order)
+        return cls((constant_part, linear_part), np.zeros(len(centre)), len(centre), order)
 
     def like(self, value: ArrayLike) -> TaylorModel:
         """Return constant functions of the same inputs and to the same order."""
@@ -128,18 +123,12 @@ class TaylorModel:
     def part_magnitudes(self) -> tuple[Array, ...]:
         """Bound over the box of the magnitude of each homogeneous part.
 
-        Since |u_i| ≤ 1, the sum of the magnitudes of its coefficients bounds a part. A factor
-        covers the rounding of that sum, of the sum of all bounds and of the few products that
-        callers form with it.
+        Since |u_i| ≤ 1, the sum of the magnitudes of its coefficients bounds a part.
 
         There is one array for each degree from 0 on, each of the shape of the array of functions.
         The remainder is not in them.
         """
-        roundings_of_callers = len(self.parts) + 4
-        return tuple(
-            np.abs(part).sum(0) * (1 + gamma(len(part) + roundings_of_callers))
-            for part in self.parts
-        )
+        return tuple(np.abs(part).sum(0) for part in self.parts)
 
     def magnitude(self) -> Array:
         """Return a bound of |f| over the box, shape V."""
@@ -151,8 +140,7 @@ class TaylorModel:
 
     def bounds(self) -> tuple[Array, Array]:
         """Return a lower and an upper bound of real functions over the box, each of shape V."""
-        # the sum value ± radius is rounded: its error is at most u (|value| + radius)
-        radius = self.deviation() * (1 + gamma(2)) + UNIT_ROUNDOFF * np.abs(self.value)
+        radius = self.deviation()
         return self.value - radius, self.value + radius
 
     def widened(self, more: ArrayLike) -> TaylorModel:
@@ -287,7 +275,7 @@ class TaylorModel:
         """Return the model on the sub-box low ≤ u ≤ high, as a model on the unit box.
 
         The new inputs w in [−1, 1]^d are those of u = (low + high)/2 + w (high − low)/2. The
-        remainder stays, with the rounding of the new coefficients added.
+        remainder stays.
 
         Args:
             low: Lower ends of the sub-box, shape (d,), not below −1.
@@ -302,18 +290,12 @@ class TaylorModel:
             scale = radius[monomials(self.inputs, degree)].prod(-1)
             axes_of_functions = tuple(range(1, 1 + self.remainder.ndim))
             parts.append(np.expand_dims(scale, axes_of_functions) * part)
-        # each derivative is a sum of d terms; |midpoint| + radius ≤ 1, so that no term of the
-        # shifted polynomial exceeds the bound of the part that it came from
-        roundings = (len(self.parts) + 1) * (self.inputs + 4)
-        rounding = gamma(roundings) * np.sum(self.part_magnitudes, 0)
-        return TaylorModel(tuple(parts), self.remainder + rounding, self.inputs, self.order)
+        return replace(self, parts=tuple(parts))
 
     def shifted_parts(self, point: Array) -> list[Array]:
         """Return the coefficients of the polynomials p(point + v) in v, by degree.
 
-        The remainder is left out, and so is the rounding of the coefficients. Where those of p and
-        the point are not negative, nothing cancels, and they have a relative error of at most γ_n
-        with n = (order + 2) (d + 4).
+        The remainder is left out.
 
         Args:
             point: Any point, in the unit box or not, shape (d,).
@@ -340,7 +322,7 @@ class TaylorModel:
         return replace(self, parts=parts, remainder=self.remainder[key])
 
     def __add__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
-        """Return the sum, which broadcasts as sums of arrays do, with its rounding.
+        """Return the sum, which broadcasts as sums of arrays do.
 
         Args:
             other: Taylor model of the same inputs, or numbers, which stand for constant functions.
@@ -357,12 +339,12 @@ class TaylorModel:
             parts.append(first + second)
         remainder = self.remainder + b.remainder
         order = max(self.order, b.order)
-        return TaylorModel(tuple(parts), remainder, self.inputs, order).with_rounding(1)
+        return TaylorModel(tuple(parts), remainder, self.inputs, order)
 
     __radd__ = __add__
 
     def __neg__(self) -> TaylorModel:
-        """Return the negative functions; a change of sign is not rounded."""
+        """Return the negative functions."""
         return replace(self, parts=tuple(-part for part in self.parts))
 
     def __sub__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
@@ -380,15 +362,14 @@ class TaylorModel:
 
         Returns:
             Taylor model of the higher order of both, whose remainder bounds the terms above this
-            order and all rounding.
+            order.
         """
         if isinstance(other, TaylorModel):
             return _product(self, other, np.multiply)
         factor = _numbers(other)
         parts = tuple(_padded(part, factor.ndim) * factor for part in self.parts)
         remainder = self.remainder * np.abs(factor)
-        scaled = TaylorModel(parts, remainder, self.inputs, self.order)
-        return scaled.with_rounding(1 + COMPLEX_ROUNDINGS)
+        return TaylorModel(parts, remainder, self.inputs, self.order)
 
     __rmul__ = __mul__
 
@@ -396,11 +377,11 @@ class TaylorModel:
         """Return the products of matrices of functions with matrices of functions or numbers."""
         if isinstance(other, TaylorModel):
             return _product(self, other, matmul)
-        return self._linear(np.matmul, _numbers(other), self.shape[-1])
+        return self._linear(np.matmul, _numbers(other))
 
     def __rmatmul__(self, other: Array) -> TaylorModel:
         factor = _numbers(other)
-        return self._linear(lambda x, y: np.matmul(y, x), factor, factor.shape[-1])
+        return self._linear(lambda x, y: np.matmul(y, x), factor)
 
     def __truediv__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
         if isinstance(other, TaylorModel):
@@ -418,7 +399,7 @@ class TaylorModel:
 
             f^a = Σ_k binomial(a, k) c^(a − k) t^k,    k = 0 … N, N the order.
 
-        The remainder bounds its rounding, and by Lagrange's form what follows: |binomial(a, N + 1)|
+        By Lagrange's form the remainder bounds what follows by |binomial(a, N + 1)|
         max(ξ^(a − N − 1)) max|t|^(N + 1), ξ between the bounds of f. A power of ξ is monotonic, so
         that its maximum lies at one of these two bounds.
 
@@ -441,33 +422,20 @@ class TaylorModel:
         binomial = 1.0
         series = self.like(centre**exponent)
         step_power = self.like(np.ones_like(centre))
-        rounding = gamma(4) * centre**exponent
         for k in range(1, N + 1):
             binomial = binomial * (exponent - k + 1) / k
             step_power = step_power * step
             coefficient = binomial * centre ** (exponent - k)
             series = series + step_power * coefficient
-            rounding = rounding + gamma(4 * k + 4) * np.abs(coefficient) * step_power.magnitude()
         next_binomial = abs(binomial * (exponent - N) / (N + 1))
         last_exponent = exponent - N - 1
         last_power = np.maximum(lower_bound**last_exponent, (centre + deviation) ** last_exponent)
-        truncation = next_binomial * last_power * deviation ** (N + 1) * (1 + gamma(8 * N + 8))
-        return series.widened(rounding + truncation)
+        return series.widened(next_binomial * last_power * deviation ** (N + 1))
 
     def contract(self, arrays: Array) -> TaylorModel:
         """Return Σ_k f[…, k] arrays[k], for V = (…, e) and numbers of shape (e, …)."""
         factor = _numbers(arrays)
-        return self._linear(lambda x, y: np.asarray(np.tensordot(x, y, 1)), factor, len(factor))
-
-    def with_rounding(self, count: int) -> TaylorModel:
-        """Return the model with the error of `count` roundings of all coefficients added.
-
-        The coefficients and the remainder are those after rounding. Each must be the result of
-        `count` rounded operations without cancellation, so that its error is at most γ_count =
-        count u / (1 − count u) of it, with the unit roundoff u.
-        """
-        of_coefficients = gamma(count) * np.sum(self.part_magnitudes, 0)
-        return self.widened(of_coefficients + gamma(count + 3) * self.remainder)
+        return self._linear(lambda x, y: np.asarray(np.tensordot(x, y, 1)), factor)
 
     def _as_model(self, other: TaylorModel | ArrayLike) -> TaylorModel:
         """Return a Taylor model as it is, and numbers as constant functions."""
@@ -475,29 +443,22 @@ class TaylorModel:
             return other
         return self.like(_numbers(other))
 
-    def _linear(
-        self, bilinear: Callable[[Array, Array], Array], factor: Array, terms: int
-    ) -> TaylorModel:
-        """Return a bilinear product with numbers, whose rounding goes into the remainder.
+    def _linear(self, bilinear: Callable[[Array, Array], Array], factor: Array) -> TaylorModel:
+        """Return a bilinear product with numbers.
 
         Args:
             bilinear: Product of an array of functions' coefficients with `factor`. It must accept
                 one more axis in front of the first array, and be a sum of products of entries, so
                 that the product of the magnitudes bounds its magnitude.
             factor: The numbers.
-            terms: Number of products that each entry of the result is the sum of.
 
         Returns:
             Taylor model of the array of functions that `bilinear` gives, of the same inputs and
             order.
         """
-        magnitude = np.abs(factor)
-        remainder = np.asarray(bilinear(self.remainder, magnitude)) * (1 + gamma(terms + 2))
-        # |fl(x·y) − x·y| ≤ γ_n |x|·|y| for sums of n products (Higham 2002, section 3.1)
-        products = bilinear(np.sum(self.part_magnitudes, 0), magnitude)
-        rounding = gamma(terms + COMPLEX_ROUNDINGS) * products
+        remainder = np.asarray(bilinear(self.remainder, np.abs(factor)))
         parts = tuple(np.asarray(bilinear(part, factor)) for part in self.parts)
-        return TaylorModel(parts, remainder + rounding, self.inputs, self.order)
+        return TaylorModel(parts, remainder, self.inputs, self.order)
 
 
 def concatenate(models: Sequence[TaylorModel], axis: int) -> TaylorModel:
@@ -565,13 +526,12 @@ def inverse_bound(matrix: TaylorModel) -> Array | None:
     """
     n = len(matrix.value)
     C = np.linalg.inv(matrix.value)  # any C would do; a good one makes the bound tight
-    # |I − C A(0)|, which is not zero by rounding alone: n products and a difference
-    defect = np.abs(np.eye(n) - C @ matrix.value)
-    defect += gamma(n + 1) * (np.abs(C) @ np.abs(matrix.value))
-    R = np.abs(C) @ matrix.deviation() + defect
-    inverse = np.linalg.inv(np.eye(n) - R) * (1 + gamma(8 * n * n))
-    # R ≥ 0 has a spectral radius below 1 if and only if (I − R)⁻¹ exists and is ≥ 0 (M-matrices)
-    if not ((inverse >= 0).all() and np.abs(np.linalg.eigvals(R)).max(initial=0.0) < 1):
+    R = np.abs(C) @ matrix.deviation() + np.abs(np.eye(n) - C @ matrix.value)
+    inverse = np.linalg.inv(np.eye(n) - R)
+    # R ≥ 0 has a spectral radius below 1 if and only if (I − R)⁻¹ exists and is ≥ 0 (M-matrices).
+    # The distance of 1e-9 from 1 is far above the rounding of R.
+    radius = np.abs(np.linalg.eigvals(R)).max(initial=0.0)
+    if not ((inverse >= 0).all() and radius < 1 - 1e-9):
         return None
     return np.asarray(inverse @ np.abs(C))
 
@@ -619,7 +579,7 @@ def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
         UnprovedError: A may be singular somewhere in the box.
         numpy.linalg.LinAlgError: A is exactly singular at the midpoint.
     """
-    # any matrix serves as a preconditioner, so that the rounding of this inverse needs no bound
+    # any matrix serves as a preconditioner
     midpoint_inverse: Any = np.linalg.inv(matrix.value)
     matrix = midpoint_inverse @ matrix
     right = midpoint_inverse @ right
@@ -671,7 +631,7 @@ def _product(
 
     Returns:
         Taylor model whose remainder bounds what the product of the polynomials leaves out of the
-        product of the functions, the terms above the order, and all rounding.
+        product of the functions, and the terms above the order.
     """
     order = max(a.order, b.order)
     ndim = max(a.remainder.ndim, b.remainder.ndim)
@@ -683,20 +643,12 @@ def _product(
     degrees = range(min(order, len(a_magnitudes) + len(b_magnitudes) - 2) + 1)
     dtype = np.result_type(a.parts[0], b.parts[0])
     parts = [zero_part(a.inputs, k, remainder.shape, dtype) for k in degrees]
-    inner = 1  # products in each entry of `bilinear`
-    if bilinear == matmul:
-        inner = a.shape[-1]
     b_padded = [_padded(y, ndim) for y in b.parts]
     for i, x in enumerate(a.parts):
         x_padded = _padded(x, ndim)
         for j, y_padded in enumerate(b_padded):
-            omitted_fraction = 1.0  # of the product of two parts, by the polynomial
             if i + j <= order:
                 parts[i + j] += convolve(x_padded, y_padded, (i, j), a.inputs, bilinear)
-                # a monomial of degree i + j splits in at most binomial(i + j, i) ways into factors
-                # of degree i and j, whose products are summed, and i + j + 1 such parts are added
-                roundings = inner * comb(i + j, i) + i + j + 1 + COMPLEX_ROUNDINGS
-                omitted_fraction = gamma(roundings)
-            remainder = remainder + omitted_fraction * bilinear(a_magnitudes[i], b_magnitudes[j])
-    remainder = remainder * (1 + gamma(inner + (order + 1) ** 2))
+            else:
+                remainder = remainder + bilinear(a_magnitudes[i], b_magnitudes[j])
     return TaylorModel(tuple(parts), np.asarray(remainder), a.inputs, order)

@@ -21,7 +21,6 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.frame.calculus.monomials import matmul, monomials, product_part
-from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, inverse_bound
 
 MIN_DEGREE, MAX_DEGREE = 4, 10
@@ -384,7 +383,7 @@ def max_eigenvalue_decrease(matrix: TaylorModel, scale: Array, *, sign: float) -
         sign: 1 or −1.
 
     Returns:
-        A bound ≥ 0, rounding included; 0 if n is 0.
+        A bound > 0, rounding included; 0 if n is 0.
     """
     if not len(scale):
         return 0.0
@@ -397,8 +396,8 @@ def max_eigenvalue_decrease(matrix: TaylorModel, scale: Array, *, sign: float) -
     of_linear = _norm_over_box(linear)
     of_quadratic = _norm_of_terms(quadratic, is_square)
     of_remainder = float(np.linalg.norm(np.abs(weight) * low_order.remainder, 2))
-    # gamma(100 n) covers the rounding of norms and eigenvalues, since only sums below 1 are of use.
-    return of_linear + of_quadratic + of_remainder + gamma(100 * len(scale))
+    # 1e-13 n is far above the rounding of norms and eigenvalues, of which only sums below 1 matter.
+    return of_linear + of_quadratic + of_remainder + 1e-13 * len(scale)
 
 
 def _norm_over_box(terms: Array) -> float:

@@ -154,8 +154,8 @@ def in_periods(assembly: Assembly[Number], ratio: Number, is_velocity: Mask) -> 
 class LinearSystem(StructureModel):
     """Base of structures whose matrices are smooth functions of named parameters.
 
-    A kind of linear structure gives `parameters`, `outputs`, `assembly` and `entry_roundings`, and
-    `ground`, `loads` and `ratios` where it has them. Until columns yield it is linear as well.
+    A kind of linear structure gives `parameters`, `outputs` and `assembly`, and `ground`, `loads`
+    and `ratios` where it has them. Until columns yield it is linear as well.
     """
 
     @property
@@ -167,11 +167,6 @@ class LinearSystem(StructureModel):
     def ratios(self) -> Collection[str | float]:
         """Damping ratios, numbers or names of parameters: none, one, or one a mode."""
         return ()
-
-    @property
-    def entry_roundings(self) -> int:
-        """Largest number of roundings in the computation of an entry of M, K and output rows."""
-        raise NotImplementedError
 
     def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
         """Return the structure with its parameters as jets or as Taylor models.

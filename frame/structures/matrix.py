@@ -271,11 +271,6 @@ class MatrixStructure(LinearSystem):
         """Number of unknowns n."""
         return int(np.shape((self.mass or self.stiffness)[0][1])[0])
 
-    @property
-    def entry_roundings(self) -> int:
-        """Roundings of a factor, such as E I / l³, and of the sum of all terms of a matrix."""
-        return 8 + max(len(self.mass), len(self.stiffness))
-
     @cached_property
     def massive(self) -> Ints:
         """Indices of the unknowns that have mass, in rising order."""

@@ -317,11 +317,6 @@ class StoreyFrame(LinearSystem):
         return tuple(np.atleast_1d(self.second_moment))
 
     @property
-    def entry_roundings(self) -> int:
-        """Roundings of a storey's stiffness 12 c E I / l³ and of the sum of two of them."""
-        return 8
-
-    @property
     def ratios(self) -> dict[str, float]:
         """Damping ratios by the names of their parameters; empty where there are none."""
         if self.damping_ratio is None:

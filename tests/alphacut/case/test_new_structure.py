@@ -45,7 +45,6 @@ class RigModel(LinearSystem):
     spring: float
     ground: Accelerogram | None = None
     outputs: tuple[str, ...] = (Output("q1"),)
-    entry_roundings = 1
 
     @property
     def parameters(self):
