@@ -283,7 +283,8 @@ class Frontier:
         n_problems = int(problem.max(initial=0)) + 1
         items = np.unique(of_key[child] * n_problems + problem)
         new_box, new_problem = np.divmod(items, n_problems)
-        return Frontier(self.lower, self.upper, *np.split(ends, 2, axis=1), new_box, new_problem)
+        low, high = np.split(ends, 2, axis=1)
+        return Frontier(self.lower, self.upper, low, high, new_box, new_problem)
 
     def _child_ends(self, keys: Ints) -> Array:
         """Return the lower and then the upper ends of the children of sub-boxes, shape (K, 2 d).
