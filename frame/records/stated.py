@@ -183,7 +183,7 @@ def _steps(text: str, place: str) -> Iterator[Stated]:
     interval = rf"{_INTERVAL}{_BEHIND}{_NUMBER}\s*[\[(]?(?P<unit>[a-zµμ]*)"
     backwards = (
         rf"(?<![\w.]){_NUMBER}\s*(?P<unit>[a-zµμ]+)[\s-]*(?:sampl\w*|time)?[\s-]*(?:interval|step)s?\b"
-        rf"|\b(?:every|spaced\s+at|intervals?\s+of)\s+(?P<number2>\d*\.?\d+)\s*(?P<unit2>[a-zµμ]+)"
+        rf"|\b(?:every\s|spaced\s+at\s|intervals?\s+of\s|time\s*[\[(])\s*(?P<number2>\d*\.?\d+)\s*(?P<unit2>[a-zµμ]+)"
     )
     for match in re.finditer(interval, text, re.IGNORECASE):
         unit = (match["before"] or match["unit"] or "").strip()

@@ -221,6 +221,7 @@ HEADS = [
     ("Time step = 0.01 (s), in units of m/s2 / 10\n", COLUMN, 0.01, None),
     ("time interval between points 0.005 sec; in cm per sec per sec\n", COLUMN, 0.005, 0.01),
     ("Rate: 100\nUnits: gal\n", COLUMN, 0.01, 0.01),
+    ("Acceleration (g) vs time (1/100 s)\n", (",", 100), 0.01, G),
 ]
 """Heads with the layout of the numbers, their step in s, and their unit in m/s²; None of others."""
 
