@@ -112,12 +112,12 @@ class MadeSection(Section):
     made_from: ClassVar[Any]
 
     @property
-    def stated(self) -> dict[str, Any]:
+    def stated(self) -> dict[str, object]:
         """The values of all keys."""
         return {name: getattr(self, name) for name in type(self).model_fields}
 
     @property
-    def made(self) -> Any:
+    def made(self) -> object:
         """The object of the dataclass."""
         return self.made_from(**self.stated)
 

@@ -267,7 +267,8 @@ class Pipeline:
             limits = content.limits_where_yielding(structure)
             task = replace(task, limited=content.limited_outputs, limits=limits)
             peaks = self._limited_peaks(task, structure)
-            asked = asked_of(structure, task.fuzzy, section.alpha, peaks=peaks, **task.times)
+            response: dict[str, Any] = {"peaks": peaks, **task.times}
+            asked = replace(asked_of(structure, task.fuzzy, section.alpha), **response)
         for key, question in content.asked().items():
             self._answer(key, question, structure, asked)
 
@@ -301,8 +302,9 @@ class Pipeline:
                 whole = content.envelope.model_copy(update={"duration": inf})
                 motions["records"] = suite.suite_records(content.records, whole, structure)
                 motions["step"] = content.envelope.step
-            fuzzy, alpha = (section.stated[name] for name in ("fuzzy", "alpha"))
-            self._answer(key, section, structure, asked_of(structure, fuzzy, alpha, **motions))
+            fuzzy, alpha = (getattr(section, name) for name in ("fuzzy", "alpha"))
+            asked = replace(asked_of(structure, fuzzy, alpha), **motions)
+            self._answer(key, section, structure, asked)
 
     def _answer(
         self, key: str, section: AnalysisSection, structure: Structure, asked: Asked
@@ -382,7 +384,8 @@ class Pipeline:
         found = suite.suite_peaks(structure, task, records, by_record)
         self.results.suite = found
         response: dict[str, Any] = {"peaks": found.peak, "suite": found, **task.times}
-        asked = asked_of(structure, task.fuzzy, task.section.alpha, records=records, **response)
+        asked = asked_of(structure, task.fuzzy, task.section.alpha)
+        asked = replace(asked, records=records, **response)
         if (fragility := self.content.incremental_question) is None:
             return asked
         question = cast("FragilityQuestion", fragility.question(structure))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from alphacut.base.progress_bar import Progress
 from alphacut.case.analyses import answer_class
@@ -13,21 +12,18 @@ from alphacut.frame.analyses.question import Asked
 from alphacut.stages.store import Stage, StageContext, StageResult
 
 
-def asked_of(
-    structure: Structure, fuzzy: Sequence[str], alpha: tuple[float, ...], **response: Any
-) -> Asked:
-    """Return what questions are asked about.
+def asked_of(structure: Structure, fuzzy: Sequence[str], alpha: tuple[float, ...]) -> Asked:
+    """Return what questions are asked about, as yet without a response.
 
     Args:
         structure: The structure.
         fuzzy: Names of its fuzzy inputs.
         alpha: α-levels.
-        response: Further fields of `Asked`, as the peaks.
     """
     inputs = structure.inputs(fuzzy)
     units = {name: structure.input_unit(name) for name in inputs}
     numbers = structure.numbers
-    return Asked(structure.model, inputs, alpha, numbers=numbers, input_units=units, **response)
+    return Asked(structure.model, inputs, alpha, numbers=numbers, input_units=units)
 
 
 def stage(key: str, inputs: object, answer: Callable[[Progress], Answer]) -> Stage[Answer]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -23,12 +24,14 @@ from alphacut.frame.analyses.suites import (
     summarised,
 )
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.spectra.code_spectrum import SuiteTarget
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Nature
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.store import Stage, StageContext, StageResult
+
+if TYPE_CHECKING:
+    from alphacut.frame.spectra.code_spectrum import SuiteTarget
 
 VERTICAL = 2
 """Index of the vertical component of a record."""
@@ -85,7 +88,7 @@ def scaled_suite(section: RecordsSection, structure: Structure) -> ScaledSuite |
     """
     if section.spectrum is None:
         return None
-    spectrum: SuiteTarget = section.spectrum.made
+    spectrum = cast("SuiteTarget", section.spectrum.made)
     return scale_suite(
         [ground for (ground,) in _corrected(section)],  # of one component each
         spectrum.target,

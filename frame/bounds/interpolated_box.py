@@ -571,8 +571,8 @@ class InterpolatedFrame:
         stiffness = model.low.stiffness[z], model.high.stiffness[z]
         if not stiffness[0] > 0:
             return
-        least = model.low.force / stiffness[1]
-        most = model.high.force / stiffness[0]
+        least = model.low.force / stiffness[1] * (1 - ROUNDING)
+        most = model.high.force / stiffness[0] * (1 + ROUNDING)
         for column, name in enumerate(self.flow.outputs):
             if self.flow.system.quantity(name) == ("residual", z):
                 of_output = values[..., column, :]

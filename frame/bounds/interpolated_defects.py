@@ -476,7 +476,7 @@ def _elastic_violation(
         small: See `defects`.
     """
     best = _elastic_violation_on(model, force, level, variation, TIME_PARTS[0])
-    enough = max(SMALL_VIOLATION * model.low.force, small * np.sqrt(model.low.slider))
+    enough = np.maximum(SMALL_VIOLATION * model.low.force, small * np.sqrt(model.low.slider))
     for pieces in TIME_PARTS[1:]:
         # Control points on shorter parts of the time lie closer to the force.
         before = best.falls.max()
