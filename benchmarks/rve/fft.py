@@ -7,7 +7,7 @@ Mécanique 343, 232, 2015), and conjugate gradients that are preconditioned by t
 a homogeneous material. It is what a reader may have written, not a library's. The material is a
 random one of two phases at contrast 10, and in the last row a disc. Both solve the loads of all
 directions, each in a process of its own, and FFT's value and the bounds are those of the mean k and
-of K. Exit status 1 if two proved sides take more than 6 times the processor time of FFT.
+of K. Exit status 1 if two proved sides take more than 8 times the processor time of FFT.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ T = TypeVar("T")
 Waves = NDArray[np.complex128]
 TOLERANCE = 1e-5
 """Relative residual in the norm of the preconditioner, so that energies are left by some 1e-10."""
-DEAREST = 6.0
+DEAREST = 8.0
 """Processor time of both proved sides over that of FFT, at most."""
 
 
@@ -243,10 +243,11 @@ def main() -> int:
     worst = 0.0
     cases = [("k", 256, 2), ("K", 256, 2), ("k", 64, 3), ("k", 128, 3), ("K", 64, 3)]
     for name, size, d in [*cases, ("K of a disc", 128, 2)]:
-        (value, price), (bounds, dearer) = (
-            ProcessPoolExecutor(1, get_context("spawn")).submit(priced, name, size, d, way).result()
-            for way in ("fft", "bounds")
-        )
+        found = []
+        for way in ("fft", "bounds"):
+            with ProcessPoolExecutor(1, get_context("spawn")) as apart:
+                found.append(apart.submit(priced, name, size, d, way).result())
+        (value, price), (bounds, dearer) = found
         times = dearer.seconds / price.seconds
         worst = max(worst, times)
         print(
