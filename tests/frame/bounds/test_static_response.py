@@ -1,5 +1,6 @@
 """Bounds of a structure at rest hold over its box, and each part of them is needed."""
 
+from fractions import Fraction
 from itertools import product
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from alphacut.base.errors import RefusedError
 from alphacut.frame import Force, History, Limit, MatrixStructure, StoreyFrame, static_bounds
-from alphacut.frame.bounds.static_response import StaticProof, StaticSearch
+from alphacut.frame.bounds.static_response import StaticProof, StaticSearch, affine_model
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.fuzzy import Crisp, Interval, Triangular
 
@@ -276,3 +277,27 @@ def test_a_length_is_bounded_over_one_box(rng):
     at_ends = 20e3 * np.array([2.95, 3.05]) ** 3 / (24 * 30e9 * 1e-5)
     assert known.lower <= at_ends[0] <= at_ends[1] <= known.upper
     assert known.slope_radii[0] == np.inf
+
+
+def test_entries_of_the_stiffness_hold_without_rounding_at_the_corners(rng):
+    for _ in range(20):
+        halves = rng.normal(size=(2, 3, 3))
+        terms = [(f"p{i}", half @ half.T) for i, half in enumerate(halves)]
+        load = Force([1.0, 0.0, 0.0], 1.0, AT_REST)
+        structure = MatrixStructure(
+            {"p0": 1.0, "p1": 1.0}, (), terms, {"u": np.eye(3)[0]}, loads=[load]
+        )
+        low = rng.uniform(0.5, 1.0, 2)
+        high = low * rng.uniform(1.0, 1.5, 2)
+        blocks = affine_model(structure, ("p0", "p1"), low, high).blocks
+        constant, linear = (blocks.homogeneous_part(k) for k in (0, 1))
+        for corner in product((-1, 1), repeat=2):
+            p = [Fraction(high[i] if sign > 0 else low[i]) for i, sign in enumerate(corner)]
+            for row, column in np.ndindex(3, 3):
+                place = row, column
+                true = sum(
+                    x * Fraction(array[place]) for x, (_, array) in zip(p, terms, strict=True)
+                )
+                found = Fraction(constant[0][place])
+                found += sum(sign * Fraction(linear[i][place]) for i, sign in enumerate(corner))
+                assert abs(true - found) <= Fraction(blocks.remainder[place])
