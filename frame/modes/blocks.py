@@ -328,7 +328,7 @@ def enclosed_block(
     if inverse_modal_mass is None:
         return None
 
-    # 2. Bounds that give themselves back. They are widened until they do, by a factor of 1.02 a
+    # 2. Bounds that give themselves back. Those that do not are widened by a factor of 1.02 a
     # round; the factor 1.001 makes rounding of the linear systems harmless.
     diagonal = L[np.arange(p), np.arange(p)]
     equations = SubspaceEquations(
@@ -350,10 +350,13 @@ def enclosed_block(
         # Entries of X are 1 in the block's own row; far larger bounds do not converge.
         if not (new_Y.max() < 10.0 and np.isfinite(new_E).all()):
             return None
-        if (1.001 * new_Y <= Y).all() and (1.001 * new_E <= E).all():
+        holds_Y = 1.001 * new_Y <= Y
+        holds_E = 1.001 * new_E <= E
+        if holds_Y.all() and holds_E.all():
             break
-        Y = 1.02 * np.maximum(new_Y, Y)
-        E = 1.02 * np.maximum(new_E, E)
+        # What holds stays: else E, which follows Y a round later, would never come up with it.
+        Y = np.where(holds_Y, Y, 1.02 * np.maximum(new_Y, Y))
+        E = np.where(holds_E, E, 1.02 * np.maximum(new_E, E))
     else:
         return None
     of_products = Y @ equations.mass_times_shapes.T

@@ -152,6 +152,18 @@ def all_blocks(structure):
     return enclose_subspaces(centre, used, centre.mode_count)
 
 
+def test_modes_of_crisp_matrices_are_enclosed_though_rounding_is_all_they_leave(rng):
+    for storeys in (2, 3, 4) * 7:
+        masses, stiffness = rng.uniform([[0.5], [500.0]], [[2.0], [2000.0]], (2, storeys))
+        frame = StoreyFrame(masses=masses, stiffness=stiffness, outputs=("q1",))
+        model = over_box(frame, ("q1_0",), np.array([-1.0]), np.array([1.0]))
+        centre, used = centred_matrices(model.mass, model.stiffness)
+        found = enclose_subspaces(centre, used, storeys)
+        enclosed = [mode for block in found.blocks for mode in block.modes]
+        assert sorted(enclosed) == list(range(storeys))
+        assert max(block.relative_error for block in found.blocks) < 1e-9
+
+
 def test_half_of_the_range_of_eigenvalues_would_not_do():
     own, _, _, _, structure = frame_in_box(1, 0.1)
     p = {name: TaylorModel.constant(x, 1) for name, x in own.parameters.items()}
