@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field
-
 from alphacut.base.errors import RefusedError, require
 from alphacut.case.analyses import ANALYSES
 from alphacut.case.material import (
@@ -38,14 +36,18 @@ class CellContent(Section, defer_build=True):
 
     Validators of this class and of those derived from it are built at first use, since a case is
     read by the class that `with_structures` derives.
+
+    Args:
+        title: one line, for figures and the report.
+        about: a paragraph: what the case shows.
+        stages: stages that `alphacut run` computes.
+        shares: whether to compute the fraction of the widths that each input causes.
     """
 
-    title: str = Field(description="one line, for figures and the report")
-    about: str = Field(default="", description="a paragraph: what the case shows")
+    title: str
+    about: str = ""
     stages: Annotated[tuple[Annotated[str, after(_stage)], ...], NotEmpty, after(distinct)]
-    """stages that `alphacut run` computes"""
     shares: bool = True
-    """whether to compute the fraction of the widths that each input causes"""
     microstructure: object = None
     radius: AnyLaw | None = None
     cell: Cell | None = None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING, asdict, fields, replace
@@ -55,7 +54,6 @@ def section_of(key: str, of: type) -> type[MadeSection]:
     "Args:". Limits are read as in [decision].
     """
     hints = get_type_hints(of, include_extras=True)
-    described = {name: about for x in of.__mro__ for name, about in descriptions(x).items()}
     keys: dict[str, Any] = {}
     for x in fields(of):
         default: Any = ... if x.default is MISSING else x.default
@@ -63,9 +61,9 @@ def section_of(key: str, of: type) -> type[MadeSection]:
             default = x.default_factory()
         if x.name != "limits":
             kind = KINDS.get(x.name) or _in_a_case(hints[x.name])
-            keys[x.name] = (kind, Field(default, description=described[x.name]))
+            keys[x.name] = (kind, default)
         elif default is not ...:
-            keys[x.name] = (tuple[AnyLimit, ...], Field((), description=described[x.name]))
+            keys[x.name] = (tuple[AnyLimit, ...], ())
     base: type[MadeSection] = AnalysisSection if issubclass(of, Question) else MadeSection
     if "limits" in hints:
         base = QuestionSection
@@ -98,18 +96,10 @@ def _in_a_case(hint: Any) -> Any:
     return hint
 
 
-def descriptions(of: type) -> dict[str, str]:
-    """Return what the docstring of a class says of each argument below "Args:", by name."""
-    _, _, text = (inspect.getdoc(of) or "").partition("Args:\n")
-    found = re.findall(r"^    (\w+): ((?:.+\n?)(?:^ {8}.+\n?)*)", text, re.MULTILINE)
-    return {name: " ".join(about.split()) for name, about in found}
-
-
 class MadeSection(Section):
     """Keys that are the fields of a frozen dataclass; `key` is the name of the section."""
 
     key: ClassVar[str]
-    made_from: ClassVar[Any]
 
     @property
     def stated(self) -> dict[str, object]:
@@ -207,10 +197,11 @@ class AnalysisSection(MadeSection):
 class QuestionSection(AnalysisSection):
     """Keys of a question about limits of outputs, and perhaps about states, of limits each."""
 
-    limits: Limits
-    """limits of outputs, 'drift1 <= 40 mm', 'max q3 <= 80 mm', 'min q3 >= -60 mm';
-    'drift <= 1 %' or 'drift <= 1/200' of the height of every storey, 'base_shear <= 8 %' of the
-    weight"""
+    limits: Limits = Field(
+        description="limits of outputs, 'drift1 <= 40 mm', 'max q3 <= 80 mm', 'min q3 >= -60 mm';"
+        " 'drift <= 1 %' or 'drift <= 1/200' of the height of every storey, 'base_shear <= 8 %' of"
+        " the weight"
+    )
 
     def with_storeys(self, structure: Structure) -> Self:
         """Return the section with each limit of every storey as one limit for each storey.

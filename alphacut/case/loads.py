@@ -139,14 +139,16 @@ class ForceSection(Section):
 
     A second force on a floor is F3_2, an impulse J3. Of a structure from matrices forces act on
     unknowns, and their parameters are F1, F2 … in their order.
+
+    Args:
+        history: step, harmonic with frequency and phase, impulse, or a file; then its start; the
+            frequency of the only force on a frame may be fuzzy, as harmonic, [8, 12] Hz: it is the
+            input `frequency` of each study, times count in periods, and peaks alone are given.
+        amplitude: amplitude by floor or unknown, as {3 = "8 kN"}; factor of a file with a unit.
     """
 
     history: Annotated[ForceHistory, text(_parse_history)]
-    """step, harmonic with frequency and phase, impulse, or a file; then its start; the frequency
-    of the only force on a frame may be fuzzy, as harmonic, [8, 12] Hz: it is the input `frequency`
-    of each study, times count in periods, and peaks alone are given"""
     amplitude: dict[str, Amplitude]
-    """amplitude by floor or unknown, as {3 = "8 kN"}; factor of a file with a unit"""
 
     def require_consistent(self) -> None:
         """Refuse a section without amplitudes, and amplitudes in a unit that does not fit.
@@ -389,27 +391,31 @@ class RecordsSection(Section):
 
     Each record is corrected, then scaled. A response lasts as long as its record and
     five natural periods, and at most envelope.duration.
+
+    Args:
+        step: time between the numbers of a file of one column.
+        unit: unit of files that have none: columns without a head, waveforms.
+        override: what files state wrongly: that of the case is taken, and said.
+        files: files or patterns, as `records/*.AT2`; FILE#CHANNEL of several. A record of two or
+            three components is a list, as ["x.AT2", "y.AT2"]: two horizontal ones, then the
+            vertical one.
+        angle: degrees by which both horizontal components are turned together, from the first one
+            of matrices.directions towards the second; "all" bounds peaks over all angles of
+            incidence.
+        baseline: mean or straight line to subtract.
+        scale: factor, "PGA = 0.3 g" or "Sa(T1) = 0.5 g", of every record; Sa(T1) is the
+            pseudo-acceleration `ω² max |u|` at the nominal structure's first period, with its own
+            damping ratio (not 5 %). Of two components it is the larger one, "RotD50(T1) = 0.5 g"
+            the median over all directions, and RotD100(T1) the largest one.
     """
 
     step: Annotated[Time, after(_step_of_record)] | None = None
-    """time between the numbers of a file of one column"""
     unit: Annotated[str, text(_parse_unit)] | None = None
-    """unit of files that have none: columns without a head, waveforms"""
-    override: list[Literal["unit", "step"]] = Field(
-        default=[], description="what files state wrongly: that of the case is taken, and said"
-    )
+    override: list[Literal["unit", "step"]] = Field([])
     files: Annotated[OneOrMany[Files], NotEmpty]
-    """files or patterns, as `records/*.AT2`; FILE#CHANNEL of several. A record of two or three
-    components is a list, as ["x.AT2", "y.AT2"]: two horizontal ones, then the vertical one"""
     angle: Annotated[float, text(_parse_angle)] = 0.0
-    """degrees by which both horizontal components are turned together, from the first one of
-    matrices.directions towards the second; "all" bounds peaks over all angles of incidence"""
-    baseline: Baseline = Field(default="none", description="mean or straight line to subtract")
+    baseline: Baseline = "none"
     scale: Annotated[Scale, text(_parse_scale)] = Scale()
-    """factor, "PGA = 0.3 g" or "Sa(T1) = 0.5 g", of every record; Sa(T1) is the pseudo-acceleration
-    `ω² max |u|` at the nominal structure's first period, with its own damping ratio (not 5 %). Of
-    two components it is the larger one, "RotD50(T1) = 0.5 g" the median over all directions, and
-    RotD100(T1) the largest one"""
     spectrum: Annotated[Any, FirstUse(SPECTRUM)] | None = None
 
     @property

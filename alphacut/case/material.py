@@ -47,10 +47,13 @@ Theta = Annotated[float, Quantity(minimum=-10, maximum=10)]
 
 
 class ThetaSection(Section):
-    """Distribution of θ alone, where a mesh from a file has the geometry."""
+    """Distribution of θ alone, where a mesh from a file has the geometry.
+
+    Args:
+        theta: support of θ.
+    """
 
     theta: Annotated[tuple[Theta, Theta], after(rising)] = (-3.0, 3.0)
-    """support of θ"""
 
     @property
     def distribution(self) -> TruncatedNormal:
@@ -65,12 +68,19 @@ class ThetaSection(Section):
 
 
 class RadiusMapSection(ThetaSection):
-    """Random radius of the particle over half the cell's side, a map of θ (the paper's eq. 12)."""
+    """Random radius of the particle over half the cell's side, a map of θ (the paper's eq. 12).
 
-    a1: Radius = Field(description="radius at the lower end of θ")
-    a3: Radius = Field(description="radius at the upper end of θ")
-    a2: Number = Field(description="slope dr/dξ at the lower end")
-    a4: Number = Field(description="slope dr/dξ at the upper end")
+    Args:
+        a1: radius at the lower end of θ.
+        a3: radius at the upper end of θ.
+        a2: slope dr/dξ at the lower end.
+        a4: slope dr/dξ at the upper end.
+    """
+
+    a1: Radius
+    a3: Radius
+    a2: Number
+    a4: Number
 
     @property
     def numbers(self) -> dict[str, FuzzyNumber]:
@@ -108,13 +118,17 @@ class RadiusMapSection(ThetaSection):
 
 
 class PhaseSection(Section):
-    """Elastic phase of a mesh."""
+    """Elastic phase of a mesh.
+
+    Args:
+        modulus: Young's modulus, or three rows of the plane-strain stiffness.
+        poisson: Poisson's ratio, beside Young's modulus.
+        loss: loss factor tan δ of the stiffness.
+    """
 
     modulus: ModulusOrStiffness
-    """Young's modulus, or three rows of the plane-strain stiffness"""
     poisson: Annotated[float, Quantity(above=-1, below=0.5)] | None = None
-    """Poisson's ratio, beside Young's modulus"""
-    loss: Loss | None = Field(default=None, description="loss factor tan δ of the stiffness")
+    loss: Loss | None = None
 
     def require_consistent(self) -> None:
         """Refuse a Poisson's ratio beside a stiffness, and Young's modulus without one."""
@@ -141,12 +155,16 @@ class PhaseSection(Section):
 
 
 class MeshedCell(Section):
-    """Phases of a mesh from a file, `mesh.file`, by the names of its physical groups."""
+    """Phases of a mesh from a file, `mesh.file`, by the names of its physical groups.
+
+    Args:
+        phases: phase of each physical group.
+    """
 
     methods: ClassVar = ("auto", "prism")
     particles: ClassVar = "mesh"  # in results
 
-    phases: dict[str, PhaseSection] = Field(description="phase of each physical group")
+    phases: dict[str, PhaseSection]
 
     @property
     def constants(self) -> dict[str, FuzzyNumber]:
@@ -209,30 +227,34 @@ def known_lattice(value: object) -> Arrangement:
 
 
 class RoundCell(Section):
-    """The two elastic phases of the periodic cell, and the shape of its particle."""
+    """The two elastic phases of the periodic cell, and the shape of its particle.
 
-    particles: str = Field(
-        default="cylinders",
-        description=f"{SHAPES}; cylinders and ellipses in plane strain, spheres in a cubic array",
-    )
+    Args:
+        particles: cylinders, spheres or ellipses(ratio of axes from 1/4 to 4, degrees), as
+            "ellipses(2, 30)"; cylinders and ellipses in plane strain, spheres in a cubic array.
+        lattice: arrangement of fibres: "square", "hexagonal" (two neighbours along x), or the sides
+            [a, b] of a rectangle along x and y, whose ratio counts. Radii are over half the
+            distance of the nearest fibres.
+        matrix_modulus: Young's modulus of the matrix.
+        matrix_poisson: Poisson's ratio of the matrix.
+        inclusion_modulus: Young's modulus of the particle, or three rows of its plane-strain
+            stiffness (11, 22, 12 with 2 ε12).
+        inclusion_poisson: Poisson's ratio of the particle, beside its modulus.
+        matrix_loss: loss factor tan δ of the matrix's stiffness, as 2 %.
+        inclusion_loss: loss factor of the particle's stiffness.
+        fraction: area fraction, below π/4 (in a hexagonal array π/√12), or volume fraction of
+            spheres, below π/6, of particles of one size; in place of [radius].
+    """
+
+    particles: str = "cylinders"
     lattice: Annotated[Arrangement, PlainValidator(known_lattice)] = "square"
-    """arrangement of fibres: "square", "hexagonal" (two neighbours along x), or the sides [a, b] of
-    a rectangle along x and y, whose ratio counts. Radii are over half the distance of the nearest
-    fibres"""
-    matrix_modulus: Modulus = Field(description="Young's modulus of the matrix")
-    matrix_poisson: Ratio = Field(description="Poisson's ratio of the matrix")
+    matrix_modulus: Modulus
+    matrix_poisson: Ratio
     inclusion_modulus: ModulusOrStiffness
-    """Young's modulus of the particle, or three rows of its plane-strain stiffness (11, 22, 12
-    with 2 ε12)"""
     inclusion_poisson: Ratio | None = None
-    """Poisson's ratio of the particle, beside its modulus"""
     matrix_loss: Loss | None = None
-    """loss factor tan δ of the matrix's stiffness, as 2 %"""
     inclusion_loss: Loss | None = None
-    """loss factor of the particle's stiffness"""
     fraction: Radius | None = None
-    """area fraction, below π/4 (in a hexagonal array π/√12), or volume fraction of spheres, below
-    π/6, of particles of one size; in place of [radius]"""
 
     @property
     def constants(self) -> dict[str, FuzzyNumber]:
@@ -372,31 +394,33 @@ PhaseModulus = Annotated[
 
 
 class ImageCell(Section):
-    """An image of the phases of a periodic cell that is the same in depth, or its whole volume."""
+    """An image of the phases of a periodic cell that is the same in depth, or its whole volume.
+
+    Args:
+        image: grey or labelled image, PNG, TIFF or .npy; of a volume a TIFF stack, a folder of
+            slices, .npy, .mhd or .nhdr.
+        pixel: side of a pixel, or its width and height.
+        voxel: side of a voxel, or those along x, y and z, in place of pixel: the image is a volume.
+        override: what a volume states wrongly: that of the case is taken.
+        threshold: grey value from which on a pixel is of the next phase.
+        labels: value of each phase in a labelled image, instead of threshold.
+        modulus: Young's modulus of each phase, dark first: 0 of a pore, or rigid.
+        poisson: Poisson's ratio of each phase.
+        loss: loss factor tan δ of each phase's Young's modulus at real ν.
+    """
 
     methods: ClassVar = ("auto",)
     particles: ClassVar = "image"
 
     image: CasePath
-    """grey or labelled image, PNG, TIFF or .npy; of a volume a TIFF stack, a folder of slices,
-    .npy, .mhd or .nhdr"""
     pixel: OneOrMany[Length] | None = None
-    """side of a pixel, or its width and height"""
     voxel: OneOrMany[Length] | None = None
-    """side of a voxel, or those along x, y and z, in place of pixel: the image is a volume"""
-    override: list[Literal["voxel"]] = Field(
-        default=[], description="what a volume states wrongly: that of the case is taken"
-    )
+    override: list[Literal["voxel"]] = Field([])
     threshold: tuple[Number, ...] | None = None
-    """grey value from which on a pixel is of the next phase"""
     labels: tuple[Annotated[float, Quantity()], ...] | None = None
-    """value of each phase in a labelled image, instead of threshold"""
-    modulus: tuple[PhaseModulus, ...] = Field(
-        description="Young's modulus of each phase, dark first: 0 of a pore, or rigid"
-    )
-    poisson: OneOrMany[Ratio] = Field(description="Poisson's ratio of each phase")
+    modulus: tuple[PhaseModulus, ...]
+    poisson: OneOrMany[Ratio]
     loss: OneOrMany[Loss] | None = None
-    """loss factor tan δ of each phase's Young's modulus at real ν"""
 
     @property
     def pairs(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber], ...]:
@@ -502,19 +526,23 @@ AnyLaw = Annotated[
 
 
 class Mesh(Section):
-    """Discretisation of the product domain."""
+    """Discretisation of the product domain.
+
+    Args:
+        file: mesh of Gmsh in place of size and layers: prisms of 15 nodes over a parallelogram or
+            hexagon and θ, or its triangles alone; its physical groups are the phases of
+            [cell.phases].
+        refine: whether to refine the mesh of a file once, for a declared error.
+        bounds: whether to prove bounds of the constants of a mesh from a file, for its geometry.
+        layers: element layers in θ, of method prism.
+        size: element size over half the cell's side.
+    """
 
     file: CaseFile | None = None
-    """mesh of Gmsh in place of size and layers: prisms of 15 nodes over a parallelogram or hexagon
-    and θ, or its triangles alone; its physical groups are the phases of [cell.phases]"""
     refine: bool = False
-    """whether to refine the mesh of a file once, for a declared error"""
     bounds: bool = False
-    """whether to prove bounds of the constants of a mesh from a file, for its geometry"""
     layers: Annotated[int, Quantity(minimum=1, maximum=10_000, is_integer=True)] = 12
-    """element layers in θ, of method prism"""
     size: Annotated[float, Quantity(minimum=0.005, below=1)] = 0.15
-    """element size over half the cell's side"""
 
 
 def known_method(name: str) -> str:
@@ -525,14 +553,19 @@ def known_method(name: str) -> str:
 
 
 class ModulusSection(Section):
-    """Computation of the fuzzy modulus."""
+    """Computation of the fuzzy modulus.
+
+    Args:
+        method: model of the cell; auto is the first that fits, which is the series.
+        plan: samples of the transformation method.
+        alpha: α-levels.
+        tolerance: relative error of E that is allowed.
+        average: E of a plane: isotropic, of the average over all directions; axes, of the paper's
+            eq. 16.
+    """
 
     method: Annotated[str, after(known_method)] = "auto"
-    """model of the cell; auto is the first that fits, which is the series"""
     plan: Literal["general", "reduced", "signed"] = "general"
-    """samples of the transformation method"""
-    alpha: Levels = Field(default=ALPHA, description="α-levels")
+    alpha: Levels = ALPHA
     tolerance: Annotated[float, Quantity(minimum=1e-10, maximum=0.1)] | None = None
-    """relative error of E that is allowed"""
     average: Literal["axes", "isotropic"] = "isotropic"
-    """E of a plane: isotropic, of the average over all directions; axes, of the paper's eq. 16"""

@@ -16,7 +16,6 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
 from alphacut.case.structure import (
     LOSS_STAND_IN,
-    RATIO_WORDS,
     DampingRatios,
     MaterialDamping,
     Structure,
@@ -234,23 +233,26 @@ class ObservedRow(Section):
 
     An acceleration is the absolute one, relative to the ground plus that of the ground;
     displacements, velocities and drifts are relative to the ground.
+
+    Args:
+        of: what of the unknowns the row takes.
+        unit: SI unit of the output, as N or N*m; m, m/s or m/s^2 unless given, none of a drift
+            ratio.
+        row: entries of the row by unknown, as {"5.x" = 1}.
+        upper: in place of the row: the unknown above, as "5.x", of a drift of the storey between
+            two.
+        lower: the unknown below; the ground unless given.
+        height: height of the storey, by which the drift is divided to a drift ratio.
+        factor: factor of the row, as "E*I*l^-2", 1 unless given.
     """
 
     of: Literal["displacement", "velocity", "acceleration"] = "displacement"
-    """what of the unknowns the row takes"""
     unit: Annotated[str | None, text(_si_unit)] = None
-    """SI unit of the output, as N or N*m; m, m/s or m/s^2 unless given, none of a drift ratio"""
-    row: dict[str, Entry] = Field(
-        default_factory=dict, description='entries of the row by unknown, as {"5.x" = 1}'
-    )
+    row: dict[str, Entry] = Field(default_factory=dict)
     upper: str = ""
-    """in place of the row: the unknown above, as "5.x", of a drift of the storey between two"""
     lower: str = ""
-    """the unknown below; the ground unless given"""
     height: Length | None = None
-    """height of the storey, by which the drift is divided to a drift ratio"""
     factor: Annotated[Monomial, text(lambda x, _: Monomial.parse(str(x)))] = Monomial(1.0, ())
-    """factor of the row, as "E*I*l^-2", 1 unless given"""
 
     def require_complete(self, key: str) -> None:
         """Refuse an output that is neither a row nor a drift, or both; `key` is its own."""
@@ -289,35 +291,41 @@ class MatricesSection(StructureSection):
     """Linear structure from matrices in SI units, each times a product of powers of parameters.
 
     A modulus that a stage computes takes the place of parameter E.
+
+    Args:
+        unknowns: names of the unknowns in the order of the matrices, as NODE.DIRECTION; or a matrix
+            file that names them.
+        parameters: quantities, crisp or fuzzy, by name.
+        affine: whether matrices of exports are known to be affine in their parameters: then two
+            exports for one parameter are enough, and none tells whether it is so.
+        override: what comments of files state wrongly: SI units are taken.
+        mass: pairs [factor, file] of M, or exports; none for stage static alone.
+        stiffness: pairs [factor, file] of K; or tables { file = FILE, NAME = VALUE } of exports for
+            several values of the parameters, of which K is a sum of terms with one parameter each.
+        damping: pairs [factor, file] of D, or exports.
+        damping_ratio: damping over the critical one, of all modes, or texts, one a mode from the
+            slowest on: ["2 %", "[2, 3, 4] %", "5 %"]; "material" takes that of the loss factors of
+            the cell, "material + 1 %" adds that of joints.
+        direction: direction of the ground: it moves all unknowns NODE.DIRECTION; or how it moves
+            each, by unknown.
+        directions: in place of it, the directions of the components of each record: two horizontal
+            ones, and perhaps the vertical one, as ["x", "y"].
+        accelerogram: file of the ground's acceleration; motion is relative to it.
+        outputs: observed quantities by name.
     """
 
     unknowns: Annotated[tuple[str, ...], NotEmpty, BeforeValidator(_unknowns), after(distinct)]
-    """names of the unknowns in the order of the matrices, as NODE.DIRECTION; or a matrix file that
-    names them"""
-    parameters: Parameters = Field(description="quantities, crisp or fuzzy, by name")
+    parameters: Parameters
     affine: bool = False
-    """whether matrices of exports are known to be affine in their parameters: then two exports for
-    one parameter are enough, and none tells whether it is so"""
-    override: list[Literal["unit"]] = Field(
-        default=[], description="what comments of files state wrongly: SI units are taken"
-    )
-    mass: Terms = Field(
-        default=(), description="pairs [factor, file] of M, or exports; none for stage static alone"
-    )
+    override: list[Literal["unit"]] = Field([])
+    mass: Terms = ()
     stiffness: Annotated[Terms, NotEmpty]
-    """pairs [factor, file] of K; or tables { file = FILE, NAME = VALUE } of exports for several
-    values of the parameters, of which K is a sum of terms with one parameter each"""
-    damping: Terms = Field(default=(), description="pairs [factor, file] of D, or exports")
-    damping_ratio: DampingRatios = Field(default=(), description=RATIO_WORDS)
+    damping: Terms = ()
+    damping_ratio: DampingRatios = ()
     direction: Direction = ""
-    """direction of the ground: it moves all unknowns NODE.DIRECTION; or how it moves each, by
-    unknown"""
     directions: tuple[Direction, ...] = ()
-    """in place of it, the directions of the components of each record: two horizontal ones, and
-    perhaps the vertical one, as ["x", "y"]"""
     accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = None
-    """file of the ground's acceleration; motion is relative to it"""
-    outputs: dict[str, ObservedRow] = Field(description="observed quantities by name")
+    outputs: dict[str, ObservedRow]
 
     # Names of unknowns in the files of "mass", "stiffness" and "damping", and of those that a file
     # itself holds ("held"). A file without names counts as one that names all unknowns of the case.

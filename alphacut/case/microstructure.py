@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Annotated
 
-from pydantic import Field
-
 from alphacut.base.errors import require
 from alphacut.case.types import CaseFile, Fraction, Length, Quantity, Section, after, rising
 from alphacut.stochastic.particles.shapes import DISCS, SPHERES
@@ -22,20 +20,24 @@ class PackingSection(Section):
     """Particles packed at random in a periodic box: discs, or spheres where the cell has spheres.
 
     Radii are log-normal between two limits (the paper's eq. 11), or those of a file.
+
+    Args:
+        packings: independent packings.
+        particles: particles in each packing.
+        fraction: area fraction, or volume fraction, of the particles.
+        smallest_radius: lower end of the radii.
+        largest_radius: upper end of the radii.
+        file: CSV file of radii or diameters, a column r [mm] or d [mm].
     """
 
     # How much statistics vary from packing to packing cannot be told from fewer than five.
     packings: Annotated[int, Quantity(minimum=5, maximum=10_000, is_integer=True)] = 20
-    """independent packings"""
     particles: Annotated[int, Quantity(minimum=10, maximum=1_000_000, is_integer=True)]
-    """particles in each packing"""
     # Equal discs jam at an area fraction of about 0.84, spheres at a smaller volume fraction.
     fraction: Annotated[float, Quantity(above=0, below=0.84)]
-    """area fraction, or volume fraction, of the particles"""
-    smallest_radius: Length | None = Field(default=None, description="lower end of the radii")
-    largest_radius: Length | None = Field(default=None, description="upper end of the radii")
+    smallest_radius: Length | None = None
+    largest_radius: Length | None = None
     file: CaseFile | None = None
-    """CSV file of radii or diameters, a column r [mm] or d [mm]"""
 
     @property
     def radii(self) -> RadiusDistribution:
@@ -116,26 +118,39 @@ class PackingSection(Section):
 
 
 class Circles(Section):
-    """Measured circles from a CSV file with the columns x, y, r."""
+    """Measured circles from a CSV file with the columns x, y, r.
 
-    file: CaseFile = Field(description="CSV file with the header x [mm], y [mm], r [mm]")
-    size: tuple[Length, Length] = Field(description="width and height of the section")
+    Args:
+        file: CSV file with the header x [mm], y [mm], r [mm].
+        size: width and height of the section.
+    """
+
+    file: CaseFile
+    size: tuple[Length, Length]
 
 
 class Photograph(Section):
-    """Circles segmented from the image of a section."""
+    """Circles segmented from the image of a section.
 
-    file: CaseFile = Field(description="image file")
-    pixel: Length = Field(description="side of a pixel")
+    Args:
+        file: image file.
+        pixel: side of a pixel.
+    """
+
+    file: CaseFile
+    pixel: Length
 
 
 class MicrostructureSection(Section):
-    """Particles from which the random radius comes: one of packing, circles and image."""
+    """Particles from which the random radius comes: one of packing, circles and image.
+
+    Args:
+        seed: seed of everything left to chance.
+        limits: lower and upper limit of r/a.
+    """
 
     seed: Annotated[int, Quantity(minimum=0, maximum=1e18, is_integer=True)]
-    """seed of everything left to chance"""
     limits: Annotated[tuple[Fraction, Fraction], after(rising)] | None = None
-    """lower and upper limit of r/a"""
     packing: PackingSection | None = None
     circles: Circles | None = None
     image: Photograph | None = None

@@ -63,35 +63,46 @@ def _file_name(value: str) -> str:
 
 
 class Study(Section):
-    """One envelope that `alphacut run` computes; what it leaves out is as in [envelope]."""
+    """One envelope that `alphacut run` computes; what it leaves out is as in [envelope].
 
-    name: Annotated[str, after(_file_name)] = Field(description="name of envelope_NAME.nc")
-    fuzzy: Names = Field(description="inputs that are fuzzy")
-    duration: Time = Field(description="length of the simulation")
-    figures: dict[str, str] = Field(
-        default={}, description="outputs that are drawn, each with its number in the paper"
-    )
+    Args:
+        name: name of envelope_NAME.nc.
+        fuzzy: inputs that are fuzzy.
+        duration: length of the simulation.
+        figures: outputs that are drawn, each with its number in the paper.
+    """
+
+    name: Annotated[str, after(_file_name)]
+    fuzzy: Names
+    duration: Time
+    figures: dict[str, str] = Field({})
 
 
 class EnvelopeSection(Section):
-    """Fuzzy forward dynamics."""
+    """Fuzzy forward dynamics.
+
+    Args:
+        fuzzy: inputs that are fuzzy; of a frame E, I, m or m1 …, l, c (columns), k (stiffness), d,
+            q0, v0, zeta (damping_ratio), rayleigh_mass, rayleigh_stiffness.
+        alpha: α-levels.
+        method: method of the envelope.
+        integrator: time stepping; by the method if left out.
+        tolerance: error that is allowed: of displacements, of forces, or over each peak.
+        gain: gain worth a trajectory to a Graph Follower, as a fraction of the tolerance.
+        duration: length of the simulation.
+        step: time step.
+    """
 
     fuzzy: Names
-    """inputs that are fuzzy; of a frame E, I, m or m1 …, l, c (columns), k (stiffness), d, q0,
-    v0, zeta (damping_ratio), rayleigh_mass, rayleigh_stiffness"""
-    alpha: Levels = Field(default=ALPHA, description="α-levels")
+    alpha: Levels = ALPHA
     method: Literal[
         "auto", "proof", "dual", "graph-follower", "improved-graph-follower", "quasi-monte-carlo"
     ] = "auto"
-    """method of the envelope"""
     integrator: Literal["midpoint", "exact"] | None = None
-    """time stepping; by the method if left out"""
     tolerance: Annotated[Tolerance, text(_parse_tolerance)] | None = None
-    """error that is allowed: of displacements, of forces, or over each peak"""
     gain: Annotated[float, Quantity(minimum=1e-6, maximum=1)] = 0.25
-    """gain worth a trajectory to a Graph Follower, as a fraction of the tolerance"""
-    duration: Time = Field(description="length of the simulation")
-    step: Time = Field(description="time step")
+    duration: Time
+    step: Time
 
     def require_steps(self, key: str, duration: float) -> None:
         """Refuse a duration that is no whole number of time steps, or of too many.
@@ -125,21 +136,24 @@ class EnvelopeSection(Section):
 
 
 class Identify(Section):
-    """Measured natural modes, from which inputs are identified."""
+    """Measured natural modes, from which inputs are identified.
+
+    Args:
+        measured: CSV file mode,frequency [Hz],q1,q2 …, or a universal file.
+        frequency_unit: of a CSV file that states none, as Hz.
+        override: what the file states wrongly: that of the case is taken.
+        floors: floor of each unknown of a universal file, as {"12.x" = 1}.
+        learn: inputs that are identified, as c or k1.
+        held_out: modes that are predicted and not learned from.
+        frequency_deviation: standard deviation of a frequency over its mean.
+        shape_deviation: standard deviation of an amplitude, over the mode's largest.
+    """
 
     measured: CaseFile
-    """CSV file mode,frequency [Hz],q1,q2 …, or a universal file"""
-    frequency_unit: str = Field(default="", description="of a CSV file that states none, as Hz")
-    override: list[Literal["frequency_unit"]] = Field(
-        default=[], description="what the file states wrongly: that of the case is taken"
-    )
-    floors: dict[str, Annotated[int, Quantity(minimum=1, is_integer=True)]] = Field(
-        default={}, description='floor of each unknown of a universal file, as {"12.x" = 1}'
-    )
-    learn: Names = Field(description="inputs that are identified, as c or k1")
+    frequency_unit: str = ""
+    override: list[Literal["frequency_unit"]] = Field([])
+    floors: dict[str, Annotated[int, Quantity(minimum=1, is_integer=True)]] = Field({})
+    learn: Names
     held_out: tuple[Annotated[int, Quantity(minimum=1, is_integer=True)], ...] = ()
-    """modes that are predicted and not learned from"""
     frequency_deviation: Fraction | None = None
-    """standard deviation of a frequency over its mean"""
     shape_deviation: Fraction | None = None
-    """standard deviation of an amplitude, over the mode's largest"""

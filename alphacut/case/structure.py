@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Annotated, Any, Literal, cast
 
 import numpy as np
-from pydantic import Field, PlainValidator, ValidationInfo
+from pydantic import PlainValidator, ValidationInfo
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
@@ -57,11 +57,6 @@ Spin = Annotated[FuzzyNumber, Quantity("rad/s", fuzzy=True)]
 ZERO = Crisp(0.0)
 NAMES = {"q0": "displacements", "v0": "velocities", "output": "outputs"}
 """Keys by the names of the frame's own arguments, where they differ."""
-RATIO_WORDS = (
-    "damping over the critical one, of all modes, or texts, one a mode from the slowest on:"
-    ' ["2 %", "[2, 3, 4] %", "5 %"]; "material" takes that of the loss factors of the'
-    ' cell, "material + 1 %" adds that of joints'
-)
 STAND_IN = Crisp(2e10)
 """Young's modulus in Pa of a frame whose own is yet to be computed."""
 LOSS_STAND_IN = Crisp(0.02)
@@ -325,45 +320,57 @@ class Frame(StructureSection):
     """Storey frame: rigid floors on elastic columns, numbered from the ground.
 
     A key with one value for each floor may hold one value for all of them.
+
+    Args:
+        masses: mass of each floor.
+        lengths: height of each storey.
+        modulus: Young's modulus where no stage computes it.
+        second_moment: second moment of area of one column of each storey.
+        columns: clamped columns in each storey.
+        stiffness: stiffness of each storey, in place of columns and modulus.
+        yield_force: force of each storey at which its columns yield.
+        yield_drift: drift at which they yield, in place of yield_force.
+        hardening: stiffness of each storey after yielding over the initial one, 0 unless given.
+        gravity: acceleration of gravity, "1 g", of weights that press on displaced storeys
+            (P-Delta): they reduce the stiffness of a storey by the weight above over its height;
+            left out unless given.
+        damping_ratio: damping over the critical one, of all modes, or texts, one a mode from the
+            slowest on: ["2 %", "[2, 3, 4] %", "5 %"]; "material" takes that of the loss factors of
+            the cell, "material + 1 %" adds that of joints.
+        dampers: viscous damper of each floor.
+        damper_placement: dampers to the ground, or between storeys.
+        displacements: displacement of each floor at the start.
+        velocities: velocity of each floor at the start.
+        rayleigh_mass: factor a of a damping a M + b K.
+        rayleigh_stiffness: factor b of a damping a M + b K.
+        rayleigh_of: whether K there is the initial stiffness of columns that yield, or the tangent
+            one.
+        accelerogram: file of the ground's acceleration; motion is relative to it.
+        outputs: observed quantities: q1, v1, a1, drift1, shear1 … (columns without dampers),
+            base_shear, overturning_moment (Σ of storey shears times heights); of columns that yield
+            residual1, ductility1, dissipated1 … besides.
     """
 
-    masses: OneOrMany[Mass] = Field(description="mass of each floor")
-    lengths: OneOrMany[Span] | None = Field(default=None, description="height of each storey")
+    masses: OneOrMany[Mass]
+    lengths: OneOrMany[Span] | None = None
     modulus: Modulus | None = None
-    """Young's modulus where no stage computes it"""
     second_moment: OneOrMany[Moment] | None = None
-    """second moment of area of one column of each storey"""
     columns: OneOrMany[Count] = (Crisp(2.0),)
-    """clamped columns in each storey"""
     stiffness: OneOrMany[Stiffness] | None = None
-    """stiffness of each storey, in place of columns and modulus"""
     yield_force: OneOrMany[YieldForce] | None = None
-    """force of each storey at which its columns yield"""
     yield_drift: OneOrMany[YieldDrift] | None = None
-    """drift at which they yield, in place of yield_force"""
     hardening: OneOrMany[Hardening] | None = None
-    """stiffness of each storey after yielding over the initial one, 0 unless given"""
     gravity: Annotated[float, Quantity("m/s^2", minimum=0)] = 0.0
-    """acceleration of gravity, "1 g", of weights that press on displaced storeys (P-Delta): they
-    reduce the stiffness of a storey by the weight above over its height; left out unless given"""
-    damping_ratio: DampingRatios = Field(default=(), description=RATIO_WORDS)
-    dampers: OneOrMany[Damping] = Field(default=(ZERO,), description="viscous damper of each floor")
+    damping_ratio: DampingRatios = ()
+    dampers: OneOrMany[Damping] = (ZERO,)
     damper_placement: Literal["ground", "storey"] | None = None
-    """dampers to the ground, or between storeys"""
     displacements: OneOrMany[Displacement] = (ZERO,)
-    """displacement of each floor at the start"""
     velocities: OneOrMany[Velocity] = (ZERO,)
-    """velocity of each floor at the start"""
-    rayleigh_mass: Rate = Field(default=ZERO, description="factor a of a damping a M + b K")
-    rayleigh_stiffness: Delay = Field(default=ZERO, description="factor b of a damping a M + b K")
+    rayleigh_mass: Rate = ZERO
+    rayleigh_stiffness: Delay = ZERO
     rayleigh_of: Literal["initial", "tangent"] = "initial"
-    """whether K there is the initial stiffness of columns that yield, or the tangent one"""
     accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = None
-    """file of the ground's acceleration; motion is relative to it"""
     outputs: Annotated[tuple[str, ...], NotEmpty] = ()
-    """observed quantities: q1, v1, a1, drift1, shear1 … (columns without dampers), base_shear,
-    overturning_moment (Σ of storey shears times heights);
-    of columns that yield residual1, ductility1, dissipated1 … besides"""
 
     @property
     def floors(self) -> int:
@@ -603,14 +610,23 @@ class Frame(StructureSection):
 
 
 class Pendulum(StructureSection):
-    """Damped pendulum: a mass on a bar under gravity; the output is the force in the bar."""
+    """Damped pendulum: a mass on a bar under gravity; the output is the force in the bar.
 
-    mass: Mass = Field(description="mass")
-    length: Span = Field(description="length of the bar")
-    damping: Turning = Field(description="moment over angular velocity")
-    gravity: Acceleration = Field(description="acceleration of gravity")
-    angle: Angle = Field(description="angle at the start, 0 hanging down")
-    angular_velocity: Spin = Field(description="angular velocity at the start")
+    Args:
+        mass: mass.
+        length: length of the bar.
+        damping: moment over angular velocity.
+        gravity: acceleration of gravity.
+        angle: angle at the start, 0 hanging down.
+        angular_velocity: angular velocity at the start.
+    """
+
+    mass: Mass
+    length: Span
+    damping: Turning
+    gravity: Acceleration
+    angle: Angle
+    angular_velocity: Spin
 
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None

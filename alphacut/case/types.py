@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import ast
 import inspect
 import itertools
 import math
-import textwrap
+import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -40,7 +39,7 @@ from alphacut.rve.cell.cell import VoigtPhase
 class Section(BaseModel):
     """One table of a case file; built, it does not change.
 
-    What a key is stands in its field, or in the line below it.
+    What a key is stands below "Args:" in the docstring of its class.
     """
 
     # An unknown key is refused, since it is a misspelt one, whose default would act in silence.
@@ -49,20 +48,21 @@ class Section(BaseModel):
         extra="forbid", frozen=True, arbitrary_types_allowed=True, defer_build=True
     )
 
+    made_from: ClassVar[Any] = object
+    """The dataclass that a section is made from, which describes its keys then."""
+
     @classmethod
     def described_fields(cls) -> dict[str, FieldInfo]:
         """Return the fields of the section by key, each with a description of what the key is.
 
-        The description stands in the field, or in the line below the key in the source of the
-        class; such a line is added to the field in place. A key without either has None.
+        Those that no field has stand below "Args:" in docstrings, and are added in place.
         """
-        # Pydantic can read these lines itself (`use_attribute_docstrings`), but does so whenever a
-        # class is defined: each command would wait 0.04 s for texts that few of them show.
-        for section in cls.__mro__:
-            for key, line in _lines_below_keys(section).items():
-                info = cls.model_fields[key]
-                if info.description is None:
-                    info.description = line
+        # They are read where they are shown: each command would wait for texts that few show.
+        for of in (*cls.made_from.__mro__, *cls.__mro__):
+            for key, about in descriptions(of).items():
+                info = cls.model_fields.get(key)
+                if info is not None and info.description is None:
+                    info.description = about
         return cls.model_fields
 
     def has_key(self, key: str) -> bool:
@@ -78,27 +78,11 @@ class Section(BaseModel):
         return self
 
 
-def _lines_below_keys(section: type) -> dict[str, str]:
-    """Return the text that stands below each key in the source of a section's class, by key.
-
-    The text is a string that follows the annotated assignment of the key, without its indentation.
-    Keys without such a text are left out. The result is empty if the class is no section or has no
-    source file.
-    """
-    if not issubclass(section, Section):
-        return {}
-    try:
-        [definition] = ast.parse(textwrap.dedent(inspect.getsource(section))).body
-    except (OSError, TypeError):  # of a class that no file defines, as `create_model` makes them
-        return {}
-    lines: dict[str, str] = {}
-    assert isinstance(definition, ast.ClassDef)
-    for statement, below in itertools.pairwise(definition.body):
-        is_text = isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
-        if isinstance(statement, ast.AnnAssign) and is_text:
-            key = ast.unparse(statement.target)
-            lines[key] = inspect.cleandoc(str(ast.literal_eval(ast.unparse(below))))
-    return lines
+def descriptions(of: type) -> dict[str, str]:
+    """Return what the docstring of a class says of each argument below "Args:", by name."""
+    _, _, text = (inspect.getdoc(of) or "").partition("Args:\n")
+    found = re.findall(r"^    (\w+): ((?:.+\n?)(?:^ {8}.+\n?)*)", text, re.MULTILINE)
+    return {name: " ".join(about.split()).rstrip(".") for name, about in found}
 
 
 class Quantity(base.Quantity):

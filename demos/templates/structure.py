@@ -63,12 +63,15 @@ class RigModel(LinearSystem):
 
 
 class Rig(StructureSection):
-    """A mass on a spring."""
+    """A mass on a spring.
+
+    Args:
+        mass: mass of the rig.
+        spring: its spring.
+    """
 
     mass: Mass
-    """mass of the rig"""
     spring: Stiffness
-    """its spring"""
 
     def structure(self, modulus: Any = None, loss: Any = None) -> Structure:
         """Return the structure at nominal values, with its fuzzy parameters."""
