@@ -14,9 +14,9 @@ from decimal import Decimal
 from functools import cache, partial
 from typing import TYPE_CHECKING
 
-from alphacut.base.number_text import MINUS, STANDARD_GRAVITY
+from alphacut.base.number_text import MINUS
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
-from alphacut.io.quantity_cures import confused_prefix, form_cure, number_cure, unit_cure
+from alphacut.io.quantity_cures import UNITS, form_cure, number_cure, unit_cure
 
 if TYPE_CHECKING:
     import pint
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Dimension:
-    """A physical dimension.
+    """A physical dimension, as units.toml has it.
 
     Args:
         name: Name of the dimension in messages.
@@ -38,62 +38,12 @@ class Dimension:
 
     name: str
     example: str
-    powers: Mapping[str, int]
+    powers: Mapping[str, int] = field(default_factory=dict)
     usual: tuple[float, float] = (0.0, float("inf"))
-    factors: Mapping[str, Decimal] = field(default_factory=dict)
+    factors: Mapping[str, str] = field(default_factory=dict)
 
 
-GRAVITY = Decimal(str(STANDARD_GRAVITY))
-QUANTITIES = {
-    "": Dimension(
-        "number without a unit", "0.3", {}, factors={"": Decimal(1), "%": Decimal("0.01")}
-    ),
-    "Pa": Dimension(
-        "stress or modulus",
-        "80 GPa",
-        {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9, "N/mm^2": 6},
-        usual=(1e3, 1e13),
-    ),
-    "m": Dimension("length", "2.5 m", {"m": 0, "cm": -2, "mm": -3, "µm": -6}, usual=(1e-9, 1e4)),
-    "m^4": Dimension(
-        "second moment of area",
-        "1e-6 m^4",
-        {"m^4": 0, "cm^4": -8, "mm^4": -12},
-        usual=(1e-13, 1e3),
-    ),
-    "kg": Dimension("mass", "20 t", {"kg": 0, "t": 3}, usual=(1e-3, 1e9)),
-    "s": Dimension("time", "30 s", {"s": 0, "ms": -3}, usual=(1e-7, 1e5)),
-    "m/s": Dimension("velocity", "-0.5 m/s", {"m/s": 0, "mm/s": -3}, usual=(1e-7, 1e3)),
-    "m/s^2": Dimension(
-        "acceleration",
-        "9.81 m/s^2",
-        {"m/s^2": 0},
-        usual=(1e-7, 1e4),
-        # For Pint g is a gram, and Gal a gallon.
-        factors={
-            "g": GRAVITY,
-            "mg": GRAVITY / 1000,
-            "%g": GRAVITY / 100,
-            "gal": Decimal("0.01"),
-            "Gal": Decimal("0.01"),
-        },
-    ),
-    "N*s/m": Dimension(
-        "damping coefficient", "50 N s/m", {"N s/m": 0, "kN s/m": 3}, usual=(1e-5, 1e12)
-    ),
-    "N*m*s": Dimension(
-        "rotational damping coefficient", "0.1 N m s", {"N m s": 0}, usual=(1e-7, 1e13)
-    ),
-    "N/m": Dimension("stiffness", "30 kN/m", {"N/m": 0, "kN/m": 3, "MN/m": 6}, usual=(1.0, 1e13)),
-    "N": Dimension("force", "0.02 N", {"N": 0, "kN": 3, "MN": 6}, usual=(1e-4, 1e10)),
-    "N*s": Dimension("impulse", "0.3 kN s", {}, usual=(1e-5, 1e10)),
-    "N*m": Dimension("moment", "12 kN m", {"N m": 0, "kN m": 3}, usual=(1e-5, 1e11)),
-    "J": Dimension("energy", "20 kJ", {}),
-    "1/s": Dimension("rate", "0.05 1/s", {"1/s": 0, "Hz": 0}),
-    "Hz": Dimension("frequency", "1.5 Hz", {"Hz": 0, "1/s": 0}, usual=(1e-4, 1e5)),
-    "rad": Dimension("angle", "1.5 rad", {"rad": 0}),
-    "rad/s": Dimension("angular velocity", "0.1 rad/s", {"rad/s": 0}),
-}
+QUANTITIES = {si: Dimension(**facts) for si, facts in UNITS["dimensions"].items()}
 """Dimensions of quantities by their SI units."""
 MIN_MAGNITUDE = 1e-36
 MAX_MAGNITUDE = 1e18
@@ -127,13 +77,13 @@ def factor(unit: str, si: str) -> Decimal:
     """
     dimension = QUANTITIES[si]
     if unit in dimension.factors:
-        return dimension.factors[unit]
+        return Decimal(dimension.factors[unit])
     if unit in dimension.powers:
         return Decimal(10) ** dimension.powers[unit]
     if not unit:
         raise ValueError(f"the unit is missing, such as {dimension.example}")
     for word in re.findall(r"[A-Za-z]+", unit):
-        if meaning := confused_prefix(word):
+        if meaning := UNITS["confused"].get(word):
             raise ValueError(f'the unit "{unit}" contains {word}: {meaning}')
     try:
         return _factor_by_pint(unit, si)

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Callable, Iterable, Iterator
 from difflib import get_close_matches
 from functools import cache
+from pathlib import Path
 
 from alphacut.base.errors import cure_of
+
+UNITS = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
+"""Dimensions with their units, and what people write for units."""
 
 
 def number_cure(text: str) -> str:
@@ -54,30 +59,6 @@ def form_cure(text: str) -> str:
         r"(?:±|\+/-)\s*[\d.]+$": 'write a spread with % or a unit, as "5 m ± 10 %" or "5 m ± 1 m"',
     }
     return cure_of(text, cures)
-
-
-def confused_prefix(word: str) -> str:
-    """Return what a unit means, and what was probably meant; empty if it is not easily confused.
-
-    The units here are right by their letters, but almost always a slip of m (milli) and M (mega):
-    a factor of 10⁹ in a structure that is otherwise plausible.
-
-    Args:
-        word: One word of a unit, such as "mN" of "mN/m".
-    """
-    meanings = {
-        "mN": "a millinewton; did you mean MN? else write newtons, as 0.09 N",
-        "mPa": "a millipascal; did you mean MPa? else write pascals, as 0.3 Pa",
-        "mJ": "a millijoule; did you mean MJ? else write joules, as 0.02 J",
-        "Mm": "a million metres; did you mean mm? else write km",
-        "Ms": "a million seconds; did you mean ms? else write seconds",
-        "mt": "a thousandth of a tonne; did you mean t? else write kg",
-        "Grad": "a thousand million radians; did you mean deg?",
-        "kt": "a knot or a kilotonne; did you mean t? else write kg, as 1e6 kg",
-        "mHz": "a thousandth of a hertz; did you mean Hz? else write Hz, as 0.05 Hz",
-        "Mt": "a million tonnes; did you mean t? else write kg, as 1e9 kg",
-    }
-    return meanings.get(word, "")
 
 
 def unit_cure(unit: str, si: str, *, fits: Callable[[str], bool], known: Iterable[str]) -> str:
@@ -164,38 +145,8 @@ def _symbols_by_letters() -> dict[str, str]:
         " kip ksi psi J kJ MJ W kgf turn"
     )
     symbols = {symbol.lower(): symbol for symbol in usual.split()}
-    # Other letters than those of the symbols: products, abbreviations, units of other countries.
-    symbols |= {
-        "cps": "Hz",
-        "msec": "ms",
-        "gr": "g",
-        "knm": "kN m",
-        "kns": "kN s",
-        "mnm": "MN m",
-        "mns": "MN s",
-        "nm": "N m",
-        "ns": "N s",
-        "nms": "N m s",
-        "rev": "turn",
-        "u": "turn",
-        "psf": "lbf/ft^2",
-        "pcf": "lbf/ft^3",
-        "kgs": "kg",
-        "lbs": "lb",
-        "mn": "MN",
-        "mpa": "MPa",
-        "kg": "kg",
-    }
-    prefixes = {
-        "": "", "nano": "n", "micro": "µ", "milli": "m", "centi": "c", "kilo": "k", "mega": "M",
-        "giga": "G",
-    }  # fmt: skip
-    names = {
-        "metre": "m", "meter": "m", "newton": "N", "pascal": "Pa", "gram": "g", "gramme": "g",
-        "second": "s", "sec": "s", "sek": "s", "hertz": "Hz", "joule": "J", "tonne": "t",
-        "radian": "rad", "degree": "deg", "minute": "min", "hour": "h",
-    }  # fmt: skip
-    for prefix, prefix_symbol in prefixes.items():
-        for name, symbol in names.items():
+    symbols |= UNITS["spellings"]
+    for prefix, prefix_symbol in UNITS["prefixes"].items():
+        for name, symbol in UNITS["names"].items():
             symbols[prefix + name] = prefix_symbol + symbol
     return symbols
