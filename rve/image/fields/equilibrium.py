@@ -642,15 +642,16 @@ class _Hybrid:
             gamma = float(np.vdot(residual, step))
             direction *= gamma / last_gamma
             direction += step
+            del step  # leaves memory for the next one
             forces = self._apply(direction)
             curvature = float(np.vdot(direction, forces))
             if not curvature > 1e-14 * scale:  # nothing but rounding is left to gain
                 break
             length = gamma / curvature
-            x += length * direction
             forces *= length
             residual -= forces
-            del step, forces  # leaves memory for the next ones
+            x += np.multiply(length, direction, out=forces)
+            del forces
         del direction
         # Here every load left counts, since it is swept down long trees: tuned.
         precise = replace(solver, accuracy=1e-3 * solver.accuracy)
