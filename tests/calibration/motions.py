@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -93,8 +92,8 @@ def reached(flow, inputs, rng: np.random.Generator, alpha=0.0, points=POINTS):
     nodes, the highest among them.
     """
     low, high = np.array([number.cut(alpha) for number in inputs.values()]).T
-    corners = list(itertools.product(*zip(low, high, strict=True)))
-    half = rng.permutation(corners)[:POINTS]
+    is_high = rng.integers(2, size=(POINTS, len(low)))  # corners, of which there may be 2³⁰
+    half = np.where(np.unique(is_high, axis=0), high, low)
     tried = np.vstack([rng.uniform(low, high, (points, len(low))), half])
     parts = [flow.values(chunk) for chunk in np.array_split(tried, -(-len(tried) // 200))]
     values = np.concatenate(parts)
