@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from itertools import cycle
 from textwrap import fill
 
 import matplotlib.pyplot as plt
@@ -17,7 +18,7 @@ from scipy.special import ndtr
 from alphacut.base.arrays import Array
 from alphacut.base.number_text import STANDARD_GRAVITY, engineering
 from alphacut.figures import style
-from alphacut.figures.style import BLUE, GREY, INK, ORANGE, WIDTH, Look
+from alphacut.figures.style import BLUE, GREY, INK, ORANGE, Look
 from alphacut.frame import (
     Decision,
     FloorSpectrum,
@@ -32,7 +33,7 @@ from alphacut.frame import (
 )
 from alphacut.frame.analyses.decision import LimitDecision, degree_text
 from alphacut.frame.analyses.fragility import LimitFragility
-from alphacut.fuzzy.result import Ends, Nature
+from alphacut.fuzzy.result import Ends
 
 LIMIT: Look = {"color": ORANGE, "lw": 1.3, "ls": "--"}
 """Line of a limit."""
@@ -49,16 +50,14 @@ def draw_bars(bars: Sequence[tuple[Array, Look]], names: Iterable[str], label: s
         names: Names of the inputs.
         label: Label of the horizontal axis.
     """
-    rows = np.arange(len(bars[0][0]), dtype=float)[::-1]
     # inches: the axis with its label takes 0.9, each row 0.36
-    figure, axes = plt.subplots(figsize=(WIDTH, 0.9 + 0.36 * len(rows)))
+    figure, (axes,) = style.panels(0.9 + 0.36 * len(bars[0][0]))
+    rows = style.rows_of(axes, names)
     for intervals, look in bars:
-        lower = intervals[:, 0]
-        upper = intervals[:, 1]
+        lower, upper = intervals.T
         axes.barh(rows, upper - lower, left=lower, lw=0, **look)
-    axes.set_yticks(rows, list(names))
     axes.set_xlabel(label)
-    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    style.legend_beside(axes)
     return figure
 
 
@@ -122,8 +121,8 @@ def draw_decision(answer: Decision) -> Figure:
         answer: Verdicts on the limits, the first of which is drawn on top.
     """
     limits = [limit for limit in answer.limits.values() if limit.peak is not None]
-    figure, axes = plt.subplots(figsize=(WIDTH, 1.2 + 0.85 * len(limits)))
-    rows = np.arange(len(limits))[::-1]  # the first limit on top
+    figure, (axes,) = style.panels(1.2 + 0.85 * len(limits))
+    rows = style.rows_of(axes, (limit.words.replace("^2", "²") for limit in limits))
     # Rows are 1 apart: the widest bar, of 0.66, leaves room for two lines of text above it.
     for row, limit in zip(rows, limits, strict=True):
         ratios = peak_over_limit(limit)
@@ -141,7 +140,6 @@ def draw_decision(answer: Decision) -> Figure:
     axes.axvline(1.0, **LIMIT)
     axes.axvline(0.0, color=GREY, lw=0.4)
     axes.set_ylim(-0.5, len(limits) - 0.2)
-    axes.set_yticks(rows, [limit.words.replace("^2", "²") for limit in limits], color=INK)
     axes.set_xlabel("peak over its limit (dashed); the darker the higher α")
     return figure
 
@@ -237,12 +235,11 @@ def draw_fragility(answer: Fragility) -> Figure:
         answer: Fragility of each limit and event.
     """
     shown = [part for part in answer.limits.values() if not part.event_name]
-    size = WIDTH, 0.9 + 2.3 * len(shown)
-    figure, panels = plt.subplots(len(shown), squeeze=False, figsize=size)
-    for axes, part in zip(panels[:, 0], shown, strict=True):
+    figure, panels = style.panels(0.9 + 2.3 * len(shown), len(shown))
+    for axes, part in zip(panels, shown, strict=True):
         draw_fragility_of(axes, answer, part)
     fit = Line2D([], [], **FIT, label=f"lognormal fit\nat α = {answer.alpha[-1]:g}")
-    style.alpha_legend(panels[0, 0], answer.alpha, [fit])
+    style.alpha_legend(panels[0], answer.alpha, [fit])
     return figure
 
 
@@ -328,7 +325,7 @@ def draw_spectra(scaled: ScaledSuite) -> Figure:
     axes.plot(periods, floor * goal, **FIT, label=f"{floor:.0%} of it")
     axes.set(title=scaled.target.name, xlabel="period T (s)", ylim=(0.0, None))
     axes.set_ylabel("pseudo-acceleration Sa (g)")
-    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    style.legend_beside(axes)
     return figure
 
 
@@ -342,37 +339,34 @@ def draw_floor_spectrum(answer: FloorSpectrum) -> Figure:
         answer: Floor spectra, of one level at least.
     """
     outputs = list(dict.fromkeys(answer.outputs))
-    size = WIDTH, 0.6 + 2.6 * len(outputs)
-    figure, panels = plt.subplots(len(outputs), sharex=True, squeeze=False, figsize=size)
+    figure, panels = style.panels(0.6 + 2.6 * len(outputs), len(outputs), sharex=True)
     order = np.argsort(answer.periods)
     periods = answer.periods[order]
+    nominal, bounds, attained = (
+        values[..., order] / STANDARD_GRAVITY
+        for values in (answer.nominal, answer.bound, answer.attained[0])
+    )
     colours = colormaps["viridis_r"](np.linspace(0.25, 0.85, len(answer.alpha)))
-    ratios = list(dict.fromkeys(answer.damping))
-    natures: dict[str, dict[Nature, None]] = {name: {} for name in outputs}  # ordered sets
-    for k, (name, ratio) in enumerate(zip(answer.outputs, answer.damping, strict=True)):
-        axes = panels[outputs.index(name), 0]
-        natures[name].update(dict.fromkeys(answer.natures[k]))
-        dashes = ("-", "--", "-.", ":")[ratios.index(ratio) % 4]
-        damping = "" if len(ratios) == 1 else f", ζ = {ratio:.3g}"
-        nominal = answer.nominal[k, order] / STANDARD_GRAVITY
-        bounds = answer.bound[:, k, order] / STANDARD_GRAVITY
-        for alpha, bound, colour in zip(answer.alpha, bounds, colours, strict=True):
-            axes.fill_between(periods, nominal, bound, color=colour, alpha=0.15, lw=0)
-            label = f"bound, α = {alpha:g}{damping}"
-            axes.plot(periods, bound, color=colour, ls=dashes, lw=1.2, label=label)
-        attained = answer.attained[0, k, order] / STANDARD_GRAVITY
-        # one entry of the legend, since the dots of all damping ratios look alike
-        label = f"attained, α = {answer.alpha[0]:g}" if ratio == ratios[0] else ""
-        axes.plot(periods, attained, color=ORANGE, ls="none", marker="o", ms=3, label=label)
-        axes.plot(periods, nominal, color=INK, ls=dashes, lw=1.2, label=f"nominal{damping}")
-    for name, axes in zip(outputs, panels[:, 0], strict=True):
-        damping = ", ".join(f"{ratio:.3g}" for ratio in ratios)
-        title = f"{name}, ζ = {damping}; {' and '.join(map(str, natures[name]))} bounds"
+    for name, axes in zip(outputs, panels, strict=True):
+        curves = [k for k, output in enumerate(answer.outputs) if output == name]
+        ratios = [f"ζ = {answer.damping[k]:.3g}" for k in curves]
+        for k, ratio, dashes in zip(curves, ratios, cycle(("-", "--", "-.", ":")), strict=False):
+            damping = "" if len(curves) == 1 else f", {ratio}"
+            for alpha, bound, colour in zip(answer.alpha, bounds[:, k], colours, strict=True):
+                axes.fill_between(periods, nominal[k], bound, color=colour, alpha=0.15, lw=0)
+                label = f"bound, α = {alpha:g}{damping}"
+                axes.plot(periods, bound, color=colour, ls=dashes, lw=1.2, label=label)
+            # one entry of the legend, since the dots of all damping ratios look alike
+            label = f"attained, α = {answer.alpha[0]:g}" if k == curves[0] else ""
+            axes.plot(periods, attained[k], color=ORANGE, ls="none", marker="o", ms=3, label=label)
+            axes.plot(periods, nominal[k], color=INK, ls=dashes, lw=1.2, label=f"nominal{damping}")
+        natures = dict.fromkeys(str(x) for k in curves for x in answer.natures[k])
+        title = f"{name}, {', '.join(ratios)}; {' and '.join(natures)} bounds"
         if answer.suite:
             title += f" of the mean over {len(answer.suite)} records"
         axes.set(title=title, ylim=(0.0, None), xlim=(0.0, None))
         axes.set_ylabel("floor spectrum Sa (g)")
-        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        style.legend_beside(axes)
     axes.set_xlabel("period T (s)")
     return figure
 
@@ -391,9 +385,8 @@ def draw_incremental(answer: Fragility) -> Figure | None:
         return None
     # Limits of the same peak share its panel, for they share its curves.
     demands = answer.limits_by_demand
-    size = WIDTH, 0.6 + 1.9 * len(demands)
-    figure, panels = plt.subplots(len(demands), sharex=True, squeeze=False, figsize=size)
-    for axes, (peak, names) in zip(panels[:, 0], demands.items(), strict=True):
+    figure, panels = style.panels(0.6 + 1.9 * len(demands), len(demands), sharex=True)
+    for axes, (peak, names) in zip(panels, demands.items(), strict=True):
         draw_demands(axes, answer, names)
         limits = [answer.limits[name] for name in names]
         for limit in limits:
@@ -408,8 +401,8 @@ def draw_incremental(answer: Fragility) -> Figure | None:
         shown = limits[0].stated_unit
         style.prefix_axis(axes, f"peak of {peak}", limits[0].unit, shown=shown)
     style.prefix_axis(axes, answer.measure, answer.unit, across=True)
-    panels[0, 0].set_title(f"{len(answer.increments)} records; limits dashed")
-    style.alpha_legend(panels[0, 0], answer.alpha)
+    panels[0].set_title(f"{len(answer.increments)} records; limits dashed")
+    style.alpha_legend(panels[0], answer.alpha)
     return figure
 
 
@@ -459,13 +452,12 @@ def draw_response_spectrum(answer: SpectrumResponse) -> Figure:
 
 def draw_accuracy(answer: SpectrumAccuracy) -> Figure:
     """Draw the error of the response-spectrum method under each record, a row for each output."""
-    rows = np.arange(len(answer.outputs), dtype=float)[::-1]
-    figure, axes = plt.subplots(figsize=(WIDTH, 0.9 + 0.36 * len(rows)))
+    figure, (axes,) = style.panels(0.9 + 0.36 * len(answer.outputs))
+    rows = style.rows_of(axes, answer.outputs)
     for row, errors in zip(rows, 100 * answer.errors.mean(axis=-1).T, strict=True):
         axes.plot(errors, np.full_like(errors, row), "o", color=BLUE, alpha=0.6, ms=5)
     axes.axvline(0.0, color=INK, lw=0.8)
     axes.set_ylim(-0.6, rows[0] + 0.6)
-    axes.set_yticks(rows, list(answer.outputs))
     axes.set_xlabel("combined peak over the peak under the record, less 1 [%]")
     return figure
 
@@ -479,15 +471,13 @@ def draw_static(answer: StaticBounds) -> Figure:
     by_unit: dict[str, list[int]] = {}
     for j, unit in enumerate(answer.units):
         by_unit.setdefault(unit, []).append(j)
-    figure, panels = plt.subplots(
-        1, len(by_unit), squeeze=False, figsize=(WIDTH, 1.0 + 0.36 * len(answer.outputs))
-    )
-    for axes, (unit, outputs) in zip(panels[0], by_unit.items(), strict=True):
+    figure, panels = style.panels(1.0 + 0.36 * len(answer.outputs), columns=len(by_unit))
+    for axes, (unit, outputs) in zip(panels, by_unit.items(), strict=True):
         names = [answer.outputs[j] for j in outputs]
-        rows = np.arange(len(outputs), dtype=float)[::-1]
         is_shape = all(re.fullmatch(r"q\d+", name) for name in names)
-        if is_shape:
-            rows = rows[::-1]
+        if is_shape:  # from the ground up
+            outputs, names = outputs[::-1], names[::-1]
+        rows = style.rows_of(axes, names)
         for level, shade in enumerate(style.colours(answer.alpha)):
             ends = answer.bounds[level, outputs]
             axes.barh(rows, ends[:, 1] - ends[:, 0], 0.6, ends[:, 0], color=shade)
@@ -497,7 +487,6 @@ def draw_static(answer: StaticBounds) -> Figure:
         axes.plot(answer.nominal[outputs], rows, "|", ls=line, color=INK, lw=0.8, ms=9)
         axes.margins(x=0.05)
         axes.axvline(0.0, color=GREY, lw=0.8)
-        axes.set_yticks(rows, names)
         style.prefix_axis(axes, "at rest", unit, across=True)
-    style.alpha_legend(panels[0, -1], answer.alpha)
+    style.alpha_legend(panels[-1], answer.alpha)
     return figure

@@ -8,14 +8,13 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from alphacut.base.number_text import ShownUnit
 from alphacut.figures import style
-from alphacut.figures.style import BLUE, GREY, INK, ORANGE, WIDTH, Look
+from alphacut.figures.style import BLUE, GREY, INK, ORANGE, Look
 from alphacut.frame import Peak, StoreyFrame
 from alphacut.frame.analyses.storey_table import storey_table
 from alphacut.frame.dynamics.nonlinear import make_flow
@@ -72,8 +71,8 @@ def profiles(peaks: Mapping[str, Peak], units: Mapping[str, ShownUnit]) -> Figur
     kinds = families({name: peak for name, peak in peaks.items() if np.isfinite(peak.upper).all()})
     if not kinds:
         return None
-    figure, panels = plt.subplots(1, len(kinds), figsize=(WIDTH, PANEL_HEIGHT), squeeze=False)
-    for axes, levels in zip(panels[0], kinds.values(), strict=True):
+    figure, panels = style.panels(PANEL_HEIGHT, columns=len(kinds))
+    for axes, levels in zip(panels, kinds.values(), strict=True):
         numbers = [level.number for level in levels]
         of_levels = [peaks[level.name] for level in levels]
         alpha = of_levels[0].alpha
@@ -94,9 +93,9 @@ def profiles(peaks: Mapping[str, Peak], units: Mapping[str, ShownUnit]) -> Figur
         output = Output(levels[0].name)
         words = output.words.split(" of ")[0].rstrip("_0123456789 ")
         axes.set_xlabel(f"{words} ({unit.label})".replace("^2", "²").removesuffix(" ()"))
-    panels[0, 0].set_ylabel("floor or storey")
+    panels[0].set_ylabel("floor or storey")
     dot = Line2D([], [], ls="", marker="o", ms=3.5, color=ORANGE, label="attained")
-    style.alpha_legend(panels[0, -1], alpha, [dot])
+    style.alpha_legend(panels[-1], alpha, [dot])
     return figure
 
 
@@ -118,22 +117,20 @@ def loops(frame: StoreyFrame, peaks: Mapping[str, Peak], *, duration: float, ste
     flow = make_flow(observed, tuple(worst), duration, step)
     points = np.array([list(nominal.values()), list(worst.values())])
     responses = flow.values(points)  # (2, time nodes, drifts and shears in turn)
-    figure, panels = plt.subplots(
-        1, len(storeys), figsize=(WIDTH, PANEL_HEIGHT - 1), squeeze=False, sharey=True
-    )
+    figure, panels = style.panels(PANEL_HEIGHT - 1, columns=len(storeys), sharey=True)
     looks: list[Look] = [
         {"color": BLUE, "lw": 1.0, "label": "nominal", "zorder": 3},
         {"color": ORANGE, "lw": 0.8, "label": "inputs of the farthest peak"},
     ]
-    for column, (axes, storey) in enumerate(zip(panels[0], storeys, strict=True)):
+    for column, (axes, storey) in enumerate(zip(panels, storeys, strict=True)):
         for response, look in zip(responses, looks, strict=True):
             axes.plot(response[:, 2 * column], response[:, 2 * column + 1], **look)
         axes.axhline(0.0, color=GREY, lw=0.5)
         axes.axvline(0.0, color=GREY, lw=0.5)
         axes.locator_params(axis="x", nbins=4)
         style.prefix_axis(axes, f"drift {storey}", "m", across=True)
-    style.prefix_axis(panels[0, 0], "shear", "N")
-    panels[0, -1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    style.prefix_axis(panels[0], "shear", "N")
+    style.legend_beside(panels[-1])
     return figure
 
 
@@ -141,7 +138,7 @@ def sketch(frame: StoreyFrame) -> Figure:
     """Draw the frame: floors with their weights, storeys with their stiffness and height."""
     heights = np.array(frame.lengths or (1.0,) * frame.floors)
     levels = np.concatenate([[0.0], np.cumsum(heights)])
-    figure, axes = plt.subplots(figsize=(WIDTH, PANEL_HEIGHT))
+    figure, (axes,) = style.panels(PANEL_HEIGHT)
     axes.fill_between([-0.3, 1.3], -0.04 * levels[-1], 0.0, color=GREY, alpha=0.4, lw=0)
     table = storey_table(frame)
     rows = [dict(zip(table.head, row, strict=True)) for row in reversed(table.rows)]

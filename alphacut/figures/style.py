@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -41,6 +41,35 @@ def figure_style() -> Iterator[None]:
     mpl.use("Agg")
     with mpl.rc_context(fname=Path(__file__).with_name("alphacut.mplstyle")):
         yield
+
+
+def panels(
+    height: float, rows: int = 1, columns: int = 1, **shared: Any
+) -> tuple[Figure, list[Axes]]:
+    """Return a new figure of usual width, and its panels row by row.
+
+    Args:
+        height: Height of the figure in inches.
+        rows: Number of rows.
+        columns: Number of panels in a row.
+        shared: `sharex` or `sharey`, as Matplotlib takes them.
+    """
+    size = (WIDTH, height)
+    figure, grid = plt.subplots(rows, columns, squeeze=False, figsize=size, **shared)
+    return figure, list(grid.flat)
+
+
+def legend_beside(axes: Axes, **options: Any) -> None:
+    """Add a legend on the right of the axes, with further options of Matplotlib."""
+    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), **options)
+
+
+def rows_of(axes: Axes, names: Iterable[str]) -> Array:
+    """Label a row of the axes by each name, the first one on top, and return their places."""
+    labels = list(names)
+    places = np.arange(len(labels), dtype=float)[::-1]
+    axes.set_yticks(places, labels)
+    return places
 
 
 def save(figure: Figure, stem: Path) -> list[Path]:
@@ -88,7 +117,7 @@ def alpha_legend(axes: Axes, alpha: Array, further: Sequence[Line2D] = ()) -> No
     handles: list[Artist] = list(patches)
     handles.append(top)
     handles.extend(further)
-    axes.legend(handles=handles, title="α-cut", loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    legend_beside(axes, handles=handles, title="α-cut")
 
 
 def prefix_axis(
