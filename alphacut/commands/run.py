@@ -27,7 +27,6 @@ from alphacut.report.page import comparison_page, render_page
 from alphacut.report.results import (
     compared,
     comparison,
-    comparison_records,
     fractions_text,
     guaranteed_of,
     material,
@@ -166,10 +165,9 @@ def compare(options: argparse.Namespace, out: TextIO) -> int:
     """
     folders = options.folder
     runs = [Summary.read(ResultsFolder.read(Path(name))) for name in folders]
-    quantities = compared(runs)
-    require(bool(quantities), "FOLDER", " and ".join(folders), "runs with a quantity in common")
-    table = comparison(quantities)
-    rows = comparison_records(quantities)
+    rows = compared(runs)
+    require(bool(rows), "FOLDER", " and ".join(folders), "runs with a quantity in common")
+    table = comparison(rows)
     files = list[Path]()
     if options.out:
         write_text(Path(options.out), comparison_page(runs, table))

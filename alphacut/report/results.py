@@ -677,70 +677,46 @@ def _driver_sentence(what: str, fractions: Mapping[str, float], *, count: int) -
     return sentence
 
 
-class Compared(NamedTuple):
-    """A quantity that runs have in common, on their lowest levels.
+def compared(runs: Sequence[Parts]) -> list[Record]:
+    """Return a row for each quantity that all runs have in common, in the order of the first run.
 
-    Args:
-        what: Its name.
-        unit: Unit of the first run.
-        values: Number in SI or text of each run, in their order.
+    Returns:
+        Its name, the unit of the first run, the number in this unit or text of each run, and the
+        ratios of all runs but the first over the first, None of texts and over 0; by the titles of
+        the columns.
     """
-
-    what: str
-    unit: ShownUnit
-    values: tuple[float | str, ...]
-
-    @property
-    def ratios(self) -> tuple[float | None, ...]:
-        """Values of all runs but the first over that of the first, or None of texts and of 0."""
-        first, *others = self.values
-        return tuple(
-            other / first
-            if isinstance(other, float) and isinstance(first, float) and first
-            else None
-            for other in others
-        )
-
-
-def compared(runs: Sequence[Parts]) -> list[Compared]:
-    """Return the quantities that all runs have in common, in the order of the first run."""
     # Runs are compared by the names of quantities, whatever their cases have besides.
-    first = {entry.what: entry.unit for entry in _compared_entries(runs[0])}
-    values = [{entry.what: entry.value for entry in _compared_entries(run)} for run in runs]
-    return [
-        Compared(what, unit, tuple(of_run[what] for of_run in values))
-        for what, unit in first.items()
-        if all(what in of_run for of_run in values)
-    ]
-
-
-def comparison(quantities: Sequence[Compared]) -> Table:
-    """Return a table of quantities as texts, with a column for each run and each ratio."""
-    rows: list[Row] = []
-    for quantity in quantities:
-        texts = [x if isinstance(x, str) else quantity.unit.text(x) for x in quantity.values]
-        ratios = ["" if ratio is None else f"{ratio:.3f}" for ratio in quantity.ratios]
-        rows.append((quantity.what, *texts, *ratios))
-    return Table(("at the lowest α", *_runs(quantities)), rows)
-
-
-def comparison_records(quantities: Sequence[Compared]) -> list[Record]:
-    """Return a row of numbers in a stated unit for each quantity, with all digits."""
+    entries = [{x.what: x for x in _compared_entries(run)} for run in runs]
+    names = ["first", "second", "third", *(f"{k}th" for k in range(4, len(runs) + 1))][: len(runs)]
     rows: list[Record] = []
-    for quantity in quantities:
-        unit = quantity.unit
-        values = [x if isinstance(x, str) else x * unit.factor for x in quantity.values]
-        columns = zip(_runs(quantities), [*values, *quantity.ratios], strict=True)
-        row: Record = {"at the lowest α": quantity.what, "unit": unit.label}
-        rows.append(row | dict(columns))
+    for what, first in entries[0].items():
+        values = [of_run[what].value for of_run in entries if what in of_run]
+        if len(values) < len(runs):
+            continue
+        row: Record = {"at the lowest α": what, "unit": first.unit.label}
+        for name, value in zip(names, values, strict=True):
+            row[name] = value if isinstance(value, str) else value * first.unit.factor
+        for name, value in zip(names[1:], values[1:], strict=True):
+            row[f"{name} over first"] = None
+            if isinstance(value, float) and isinstance(first.value, float) and first.value:
+                row[f"{name} over first"] = value / first.value
+        rows.append(row)
     return rows
 
 
-def _runs(quantities: Sequence[Compared]) -> list[str]:
-    """Return the titles of the columns of runs, and of the ratios of all but the first."""
-    count = len(quantities[0].values) if quantities else 0
-    names = ["first", "second", "third", *(f"{number}th" for number in range(4, count + 1))][:count]
-    return [*names, *(f"{name} over first" for name in names[1:])]
+def comparison(rows: Sequence[Record]) -> Table:
+    """Return rows of `compared` as a table of texts, of numbers with their units."""
+    titles = [title for title in rows[0] if title != "unit"]
+
+    def text(title: str, row: Record) -> str:
+        """Return the text of a column of a row."""
+        value = row[title]
+        if isinstance(value, float):
+            unit = ShownUnit(str(row["unit"]), 1.0)
+            return f"{value:.3f}" if " over " in title else unit.text(value)
+        return str(value or "")
+
+    return Table(tuple(titles), [tuple(text(title, row) for title in titles) for row in rows])
 
 
 def _compared_entries(parts: Parts) -> Iterator[ComparedEntry]:
