@@ -61,9 +61,7 @@ class PackingSection(Section):
                 radii of the file or the two limits make no distribution.
         """
         # Still nearer to random close packing the simulation would not come to an end.
-        shape = DISCS
-        if spheres:
-            shape = SPHERES
+        shape = SPHERES if spheres else DISCS
         fits = self.fraction <= shape.densest
         key = "microstructure.packing.fraction"
         allowed = f"shares up to {shape.densest:g} of {shape.particles} packed at random"
@@ -89,15 +87,12 @@ class PackingSection(Section):
         from alphacut.stochastic import pack  # takes time to import
 
         self.require_readable(spheres=spheres)
-        shape = DISCS
-        if spheres:
-            shape = SPHERES
         return pack(
             self.particles,
             packings=self.packings,
             fraction=self.fraction,
             radii=self.radii,
-            shape=shape.particles,
+            shape="spheres" if spheres else "discs",
             seed=seed,
             workers=workers,
             progress=progress,

@@ -147,21 +147,19 @@ def _refusals(model: type[Section], error: ValidationError) -> Iterator[RefusedE
     suggested = {key: _suggested_key(model, key) for key in unknown}
     for key, detail in details:
         if key in suggested:
-            kind = "key"
-            if isinstance(detail["input"], dict):
-                kind = "section"
+            kind = "section" if isinstance(detail["input"], dict) else "key"
             # The suggestion is the full name of a known key; the key itself if it is known, though
             # not allowed here; or "". In the same section its last name alone is shown.
             close = suggested[key].removeprefix(f"{key.rpartition('.')[0]}.")
-            names = ", ".join(_sibling_names(model, key))
+            what = f"an unknown {kind}"
+            names = _sibling_names(model, key)
             if suggested[key] == key:  # as cell.matrix_modulus of a cell whose mesh is a file
-                yield RefusedError(key, f"a {kind} of another kind of section", names)
-            elif "." in close:  # in another section; the keys of this one are listed as well
-                yield RefusedError(key, f"an unknown {kind}", names, f"did you mean {close}?")
-            elif close:
-                yield RefusedError(key, f"an unknown {kind}", "", f"did you mean {close}?")
-            else:
-                yield RefusedError(key, f"an unknown {kind}", names)
+                what = f"a {kind} of another kind of section"
+                close = ""
+            elif close and "." not in close:  # of another section the keys of this one are listed
+                names = []
+            cure = f"did you mean {close}?" if close else ""
+            yield RefusedError(key, what, ", ".join(names), cure)
         elif key not in suggested.values():
             yield _refusal(model, key, detail)
 

@@ -445,14 +445,13 @@ class Frame(StructureSection):
         # storeys stand drifts of some 5 % of their height, and yield below 2 %
         if drift > height / 4:
             yield f"frame.displacements shear a storey by {drift:.3g} m: is a unit wrong?"
-        yield_drifts = [x.nominal for x in self.yield_drift or ()]
-        if yield_drifts and max(yield_drifts) > height / 4:
-            yield f"frame.yield_drift is up to {max(yield_drifts):.3g} m: is its unit right?"
+        largest = max((x.nominal for x in self.yield_drift or ()), default=0.0)
+        if largest > height / 4:
+            yield f"frame.yield_drift is up to {largest:.3g} m: is its unit right?"
         weight = STANDARD_GRAVITY * sum(x.nominal for x in self.per_floor(self.masses))
-        forces = [x.nominal for x in self.yield_force or ()]
+        fraction = max((x.nominal for x in self.yield_force or ()), default=np.inf) / weight
         # even isolators slide at some 2 % of the weight above them
-        if forces and max(forces) < 0.002 * weight:
-            fraction = max(forces) / weight
+        if fraction < 0.002:
             yield f"frame.yield_force is at most {fraction:.2g} of the weight: is its unit right?"
         if self.gravity > 2 * STANDARD_GRAVITY:
             yield f'frame.gravity is {self.gravity:g} m/s^2: write "1 g" or "9.81 m/s^2"'
@@ -638,12 +637,12 @@ class Pendulum(StructureSection):
         Raises:
             RefusedError: The values make no pendulum.
         """
-        # keys of the section, and the arguments of `pendulum` in the same order
-        keys = ("mass", "length", "damping", "gravity", "angle", "angular_velocity")
-        arguments = ("mass", "length", "damping", "gravity", "phi0", "omega0")
-        numbers = [getattr(self, key) for key in keys]
-        values = {name: x.nominal for name, x in zip(arguments, numbers, strict=True)}
-        model = pendulum(**values)
+        numbers = {
+            **{key: getattr(self, key) for key in ("mass", "length", "damping", "gravity")},
+            "phi0": self.angle,
+            "omega0": self.angular_velocity,
+        }
+        model = pendulum(**{name: x.nominal for name, x in numbers.items()})
         # The model also observes the angle; a case has the force in the bar alone.
         model = replace(model, observed={"force": model.observed["force"]})
-        return Structure(model, dict(zip(model.parameters, numbers, strict=True)))
+        return Structure(model, dict(zip(model.parameters, numbers.values(), strict=True)))

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import types
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache
+from inspect import Parameter, signature
 from typing import (
     Annotated,
     Any,
@@ -201,48 +202,32 @@ def _read_fields(kind: Any, document: Any, path: str) -> Any:
             another kind; the message begins with the path. Also what the class itself raises.
     """
     _require(isinstance(document, dict), document, path)
-    # An unknown field tells of another version of the program, or of a slip in a file by hand.
-    known = _known_fields(kind)
-    for name in document:
-        is_known = name in known.types or name in known.derived
-        _require(is_known, name, _entry_path(path, name))
-    for name in known.required:
-        _require(name in document, None, _entry_path(path, name))
-    # What a dataclass makes itself follows from the other fields, and is made again by its class.
+    hints = _hints(kind)
+    taken = hints if is_typeddict(kind) else _parameters(kind)  # typed dicts require no field
+    for name, x in taken.items():
+        has_default = getattr(x, "default", None) is not Parameter.empty
+        _require(has_default or name in document, None, _entry_path(path, name))
     values = {}
     for name, entry in document.items():
-        if name not in known.derived:
-            values[name] = _read(known.types[name], entry, _entry_path(path, name))
+        entry_path = _entry_path(path, name)
+        # An unknown field tells of another version of the program, or of a slip in a file by hand.
+        _require(name in hints, name, entry_path)
+        # What a dataclass makes itself follows from the other fields, and is made again by it.
+        if name in taken:
+            values[name] = _read(hints[name], entry, entry_path)
     return kind(**values)
 
 
-@dataclass(frozen=True)
-class _KnownFields:
-    """Fields of a kind: types by name, those without default, and those that follow from others."""
-
-    types: Mapping[str, Any]
-    required: tuple[str, ...]
-    derived: tuple[str, ...] = ()
+@cache
+def _hints(kind: Any) -> dict[str, Any]:
+    """Return the types of the fields of a kind, with the checks of their values."""
+    return get_type_hints(kind, include_extras=True)
 
 
 @cache
-def _known_fields(kind: Any) -> _KnownFields:
-    """Return the fields of a dataclass, typed dict or named tuple, which is cached.
-
-    Returns:
-        Type of each field that a document may have, by its name; names of those without a default;
-        and names of those that a dataclass makes itself (`init=False`).
-    """
-    # Annotations may be texts (PEP 563), and `Annotated` carries the checks of values.
-    hints = get_type_hints(kind, include_extras=True)
-    if is_typeddict(kind):
-        return _KnownFields(hints, tuple(kind.__required_keys__))
-    if not is_dataclass(kind):
-        return _KnownFields(hints, tuple(x for x in kind._fields if x not in kind._field_defaults))
-    own = [x for x in fields(kind) if x.init]
-    required = [x.name for x in own if x.default is MISSING and x.default_factory is MISSING]
-    derived = [x.name for x in fields(kind) if not x.init]
-    return _KnownFields({x.name: hints[x.name] for x in own}, tuple(required), tuple(derived))
+def _parameters(kind: Any) -> Mapping[str, Parameter]:
+    """Return the fields that a dataclass or named tuple is made from."""
+    return signature(kind).parameters
 
 
 def _require(condition: bool, document: Any, path: str) -> None:
