@@ -30,11 +30,8 @@ def printable(value: object, most: int = MAX_LENGTH) -> str:
     except ValueError:
         # Python refuses to write integers of more than some thousands of digits.
         text = "a number of thousands of digits"
-    characters = [" "] * len(text)
-    for k, character in enumerate(text):
-        if character.isprintable():
-            characters[k] = character
-    line = " ".join("".join(characters).split())
+    shown = "".join(x if x.isprintable() else " " for x in text)
+    line = " ".join(shown.split())
     if len(line) <= most:
         return line
     return f"{line[: most - 1]}…"

@@ -22,6 +22,11 @@ class Table(NamedTuple):
     head: tuple[str, ...]
     rows: list[tuple[str, ...]]
 
+    @property
+    def records(self) -> list[dict[str, str]]:
+        """The texts of each row by the titles of their columns."""
+        return [dict(zip(self.head, row, strict=True)) for row in self.rows]
+
 
 class ShownUnit(NamedTuple):
     """A unit in which a quantity is shown.
@@ -72,10 +77,8 @@ def engineering(value: float, si: str, *, digits: int = 4) -> str:
             rounded_text = f"{rounded_value:.0f}"  # short enough without an exponent
         return f"{rounded_text} {si}".strip().replace("-", MINUS)
     exponent = _prefix_exponent(abs(rounded_value))
-    scaled = rounded_value / 10.0**exponent
-    places = max(digits, len(f"{abs(scaled):.0f}"))
-    number = f"{scaled:#.{places}g}".rstrip(".")
-    return f"{number} {PREFIXES[exponent]}{si}".replace("-", MINUS)
+    unit = ShownUnit(f"{PREFIXES[exponent]}{si}", 10.0**-exponent)
+    return unit.text(rounded_value, digits=digits)
 
 
 def _takes_prefix(si: str) -> bool:
@@ -162,12 +165,10 @@ def text_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     Raises:
         ValueError: A row has another number of cells than the head.
     """
-    lines = [list(head)]
-    lines.extend(list(row) for row in rows)
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    lines = [head, *rows]
+    first_width, *widths = (max(map(len, column)) for column in zip(*lines, strict=True))
     text = ""
-    for line in lines:
-        cells = [line[0].ljust(widths[0])]
-        cells.extend(map(str.rjust, line[1:], widths[1:]))
+    for first, *others in lines:
+        cells = [first.ljust(first_width), *map(str.rjust, others, widths)]
         text += "  ".join(cells).rstrip() + "\n"
     return text

@@ -73,30 +73,24 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
     )
     # The commas within the brackets of a fuzzy frequency separate no words.
     kind, *words = [word.strip() for word in re.split(r",(?![^\[]*\])", str(value))]
-    starts = [word.removeprefix("from ") for word in words if word.startswith("from ")]
-    numbers = [word for word in words if word != "static" and not word.startswith("from ")]
-    is_static = "static" in words
-    n_options = len(words) - len(numbers)
-    if kind == "impulse":
-        require(not words, "", value, allowed)
-        return ForceHistory(None, "N*s")
+    options = [word for word in words if word == "static" or word.startswith("from ")]
+    numbers = [word for word in words if word not in options]
+    is_static = options == ["static"]
     # A static force has acted for ever, at its first value. A harmonic one has no such value.
-    if kind == "harmonic":
-        fits = len(numbers) in (1, 2) and n_options <= 1 and not is_static
-    else:
-        fits = not numbers and n_options <= 1
-    require(fits, "", value, allowed)
+    counts = (1, 2) if kind == "harmonic" else (0,)
+    fits = len(numbers) in counts and len(options) <= (kind != "impulse")
+    require(fits and not (is_static and numbers), "", value, allowed)
+    if kind == "impulse":
+        return ForceHistory(None, "N*s")
     try:
         start = 0.0
-        if starts:
-            start = quantity.parse_number(starts[0], "s")
+        if options and not is_static:
+            start = quantity.parse_number(options[0].removeprefix("from "), "s")
         if kind == "harmonic":
             frequency = quantity.parse_fuzzy(numbers[0], "Hz")
             if frequency.support.lower <= 0:
                 raise ValueError("frequencies are above 0 Hz")
-            phase = 0.0
-            if len(numbers) == 2:
-                phase = quantity.parse_number(numbers[1], "rad")
+            phase = quantity.parse_number(numbers[1], "rad") if numbers[1:] else 0.0
             history = History.harmonic(frequency.nominal, phase, start)
             is_fuzzy = frequency.support.width > 0
             return ForceHistory(history, frequency=frequency if is_fuzzy else None)
@@ -113,13 +107,10 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
     from alphacut.frame.records.tables import read_force_history  # takes time to import
 
     force = read_force_history(path)
+    history = History(force.step, force.samples, start, is_static=is_static)
     # A file with a unit has forces, and amplitudes are factors of them; one without has numbers,
     # and amplitudes are forces.
-    unit = "N"
-    if force.has_unit:
-        unit = ""
-    history = History(force.step, force.samples, start, is_static=is_static)
-    return ForceHistory(history, unit)
+    return ForceHistory(history, "" if force.has_unit else "N")
 
 
 def _parse_amplitude(value: object, _: ValidationInfo) -> tuple[FuzzyNumber, str]:

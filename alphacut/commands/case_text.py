@@ -117,26 +117,21 @@ def rows_of(prefix: str, section: Section) -> Iterator[Row]:
     """
     for key, info in type(section).model_fields.items():
         is_stated = section.has_key(key)
-        is_default = key == "columns" and getattr(section, "stiffness", None) is None
+        if not is_stated and (key != "columns" or getattr(section, "stiffness", None) is not None):
+            continue
         unit = quantity_of(info)
-        si = ""
-        if unit:
-            si = unit.si
+        si = unit.si if unit else ""
         for index, entry in _entries(getattr(section, key)).items():
             row_key = f"{prefix}{key}{index}"
             if isinstance(entry, Section):
                 yield from rows_of(f"{row_key}.", entry)
             elif isinstance(entry, FuzzyNumber):
-                if is_stated or is_default:
-                    words = _numbers(entry, si)
-                    kind = "default"
-                    if is_stated:
-                        kind = _kind_of(entry)
-                    if unit:
-                        kind += _mark_of_size(entry, si)
-                    yield row_key, words, kind
+                kind = _kind_of(entry) if is_stated else "default"
+                if unit:
+                    kind += _mark_of_size(entry, si)
+                yield row_key, _numbers(entry, si), kind
             elif isinstance(entry, float):
-                if si and (is_stated or is_default):
+                if si:
                     yield row_key, engineering(entry, si), "number"
             else:
                 yield from ((row_key, words, kind) for words, kind in _words_and_kind(entry))

@@ -140,8 +140,7 @@ def sketch(frame: StoreyFrame) -> Figure:
     levels = np.concatenate([[0.0], np.cumsum(heights)])
     figure, (axes,) = style.panels(PANEL_HEIGHT)
     axes.fill_between([-0.3, 1.3], -0.04 * levels[-1], 0.0, color=GREY, alpha=0.4, lw=0)
-    table = storey_table(frame)
-    rows = [dict(zip(table.head, row, strict=True)) for row in reversed(table.rows)]
+    rows = storey_table(frame).records[::-1]
     for z, (below, above) in enumerate(pairwise(levels)):
         is_yielding = bool(frame.hardening) and frame.hardening[z] < 1
         look: Look = {"color": ORANGE if is_yielding else INK, "lw": 1.5}

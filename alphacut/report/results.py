@@ -352,9 +352,7 @@ def peak_table(parts: Parts) -> Table:
         meant; the limit; and whether it is exceeded. Empty columns are left out. Peaks over a suite
         come last. Without peaks the table is empty.
     """
-    studies: dict[str, EnvelopeResult | SuitePeaks] = dict(parts.envelopes)
-    if parts.records is not None:
-        studies["records"] = parts.records
+    studies = parts.studies
     if not studies:
         return Table((), [])
     # All studies of a case have the same levels.
@@ -519,18 +517,16 @@ def natures(parts: Parts) -> Iterator[str]:
     suite = parts.records
     if parts.modulus is not None and parts.modulus.particles == "mesh":
         yield mesh_words(parts.modulus.nature)
-    peaks_of_studies = [study.peak for study in parts.envelopes.values()]
     over = "over time"
     if not all(study.is_over_time for study in parts.envelopes.values()):
         over = "over as many periods of the force as its nominal frequency has in the duration"
     if suite is not None:
-        peaks_of_studies.append(suite.peak)
         over = "over time and records"
         if suite.has_angles:
             over = "over time, records and all angles of incidence"
     outputs: dict[Nature, dict[str, None]] = {}  # an ordered set of names for each guarantee
-    for peaks in peaks_of_studies:
-        for output, peak in peaks.items():
+    for study in parts.studies.values():
+        for output, peak in study.peak.items():
             outputs.setdefault(peak.nature, {})[output] = None
     # With a single guarantee the names of the outputs are left out.
     groups = [f"{nature} ({', '.join(names)})" for nature, names in outputs.items()]
@@ -546,11 +542,10 @@ def natures(parts: Parts) -> Iterator[str]:
     if suite is not None:
         yield "A mean is that of one structure's peaks; its bounds are means of the records' bounds"
     # Envelopes whose own bounds are not guaranteed were compared with wider ones that are.
-    tested = {True: 0, False: 0}
-    for study in parts.envelopes.values():
-        tested[study.nature is Nature.GUARANTEED] += study.motions_tested
-    for is_guaranteed, count in tested.items():
-        if count:
+    for is_guaranteed in (True, False):
+        envelopes = parts.envelopes.values()
+        tested = [x for x in envelopes if (x.nature is Nature.GUARANTEED) == is_guaranteed]
+        if count := sum(study.motions_tested for study in tested):
             yield f"{count} exact motions by another algorithm {agreement(is_guaranteed)}"
 
 
@@ -576,11 +571,8 @@ def wide_bounds(parts: Parts) -> Iterator[str]:
     Args:
         parts: Numbers of the results.
     """
-    studies = [study.peak for study in parts.envelopes.values()]
-    if parts.records is not None:
-        studies.append(parts.records.peak)
-    for peaks in studies:
-        for name, peak in peaks.items():
+    for study in parts.studies.values():
+        for name, peak in study.peak.items():
             if peak.warning:
                 yield f"Warning: {name}: {peak.warning}"
 

@@ -209,13 +209,11 @@ def shown(frame: pd.DataFrame) -> Table:
     ):
         if low not in filled:
             continue
-        lower_ends = []
-        upper_ends = []
-        for lower, upper, nature in filled[[low, high, guarantee]].itertuples(index=False):
-            ends = rounded_ends(lower, upper, Nature(nature), DIGITS)
-            lower_ends.append(ends[0])
-            upper_ends.append(ends[1])
-        filled = filled.assign(**{low: lower_ends, high: upper_ends})
+        ends = [
+            rounded_ends(lower, upper, Nature(nature), DIGITS)
+            for lower, upper, nature in filled[[low, high, guarantee]].itertuples(index=False)
+        ]
+        filled = filled.assign(**dict(zip((low, high), zip(*ends, strict=True), strict=True)))
     rows = [tuple(map(_text, row)) for row in filled.itertuples(index=False)]
     return Table(tuple(map(str, filled)), rows)
 
@@ -323,14 +321,11 @@ def latex(table: Table) -> str:
         "µ": r"\textmu{}",
         "−": "$-$",
         "²": "$^2$",
+        "≤": r"$\leq$",
+        "≥": r"$\geq$",
+        "±": r"$\pm$",
+        "α": r"$\alpha$",
+        "ν": r"$\nu$",
+        "ζ": r"$\zeta$",
     }
-    for sign, name in {
-        "≤": "leq",
-        "≥": "geq",
-        "±": "pm",
-        "α": "alpha",
-        "ν": "nu",
-        "ζ": "zeta",
-    }.items():
-        commands[sign] = rf"$\{name}$"
     return text.translate(str.maketrans(commands))

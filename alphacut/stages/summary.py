@@ -112,11 +112,8 @@ class Results:
         heights = {x: height.nominal for x, height in structure.heights.items() if x in observed}
         described: dict[str, Any] = {}
         if isinstance(structure.model, StoreyFrame):
-            table = storey_table(structure.model)
-            described = {
-                "storeys": [dict(zip(table.head, row, strict=True)) for row in table.rows],
-                "assumptions": assumptions(structure.model),
-            }
+            described["storeys"] = storey_table(structure.model).records
+            described["assumptions"] = assumptions(structure.model)
         return FrameResult(
             omega_rad_per_s=omega,
             period_s=float(2 * np.pi / omega[0]),
@@ -204,10 +201,14 @@ class Parts:
     @property
     def encloses(self) -> str:
         """Name of the set of inputs around which the peaks are those of a box; empty without."""
-        peaks = [peak for study in self.envelopes.values() for peak in study.peak.values()]
-        if self.records is not None:
-            peaks.extend(self.records.peak.values())
+        peaks = (peak for study in self.studies.values() for peak in study.peak.values())
         return next((peak.encloses for peak in peaks if peak.encloses), "")
+
+    @property
+    def studies(self) -> dict[str, EnvelopeResult | SuitePeaks]:
+        """What has peaks, by name: the studies, and at last the suite as "records"."""
+        suite = {} if self.records is None else {"records": self.records}
+        return {**self.envelopes, **suite}
 
     @property
     def shown_units(self) -> dict[str, ShownUnit]:
@@ -220,15 +221,12 @@ class Parts:
         """
         units: dict[str, str] = {}
         largest: dict[str, float] = {}
-        studies: list[EnvelopeResult | SuitePeaks] = [*self.envelopes.values()]
-        if self.records is not None:
-            studies.append(self.records)
-        for study in studies:
+        for study in self.studies.values():
             units |= study.units
             for name, peak in study.peak.items():
-                size = max(abs(float(peak.lower[0])), abs(float(peak.upper[0])))
+                ends = float(peak.lower[0]), float(peak.upper[0])
                 output = output_of(name)
-                largest[output] = max(largest.get(output, 0.0), size)
+                largest[output] = max(largest.get(output, 0.0), *map(abs, ends))
         # Outputs without a peak have the extremes of their envelope.
         for envelope in self.envelopes.values():
             for output in envelope.min:
