@@ -45,6 +45,7 @@ HERTZ = {
     "cycle/s": 1.0, "cycles per second": 1.0, "rad/s": 0.0, "rad/sec": 0.0, "rpm": 0.0,
     "1/min": 0.0, "radians per second": 0.0, "radians/second": 0.0, "rad s-1": 0.0, "rad*hz": 0.0,
     "cpm": 0.0, "1/s": 0.0, "s^-1": 0.0, "kilohertz": 1e3, "millihertz": 1e-3,
+    "c.p.s.": 1.0, "oscillations per second": 1.0, "mhz": 1e-3,
 }  # fmt: skip
 
 
@@ -93,10 +94,16 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
             r"(?i)\b(?:periods?|omega\w*|angular|circular|pulsation|eigenvalues?|lambda|2\s*pi)\b"
         )
         words += rf"|ω|2\s*π|^T\b|{FACTOR}|\bscaled\s+by\b|\bper\s+minute|/\s*min\b"
+        # Angular frequencies and ratios, and words glued before a frequency, as "Kreisfrequenz".
+        words += r"|\bpulsations\b|2\s*[x×*·]\s*(?:pi\b|π)"
+        words += r"|\b(?:rad|deg)\w*\W*(?:per\s+)?s(?:ec\w*)?\b"
+        words += r"|\b(?:ratios?|divided|log(?:10|arithm\w*)?)\b|\bf\w?\s*/\s*f"
+        words += r"|\b(?!(?:eigen|natural|modal|resonan\w{0,2})freq)[a-zäöü]+frequen[cz]"
         words += r"|\bsquared|hz(?:\^|²)|\bin\s+[\d.]+\s*k?hz"
         words += r"|(?:frequenc\w+|values)\s+(?:are\s+)?normali"
         if {"frequency_std", "shape_std"} & columns.keys():
-            words += r"|(?:std|deviation|scatter|error|uncertaint)\w*\b.*(?:%|\bper\s?cent)"
+            words += r"|(?:std|deviation|scatter|error|uncertaint)\w*\b"
+            words += r".*(?:%|\bper\s?cent|\brelative)"
         other = next((x for x in [*header, *comments] if re.search(words, x.strip())), "")
         cure = "write frequencies in Hz, ω/(2π) or 1/T, and deviations in Hz, without a factor"
         require(not other, place, other[:80], "frequencies, not angular ones or periods", cure)
@@ -144,7 +151,7 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
 
 def _hertz_of(place: str, unit: str) -> float:
     """Return Hz in a unit of frequency, 0 of angular frequencies; refuse others."""
-    hertz = HERTZ.get(unit.strip().lower())
+    hertz = None if "MH" in unit else HERTZ.get(unit.strip().lower())  # 1 MHz is not 1 mHz
     if not hertz:
         cure = "divide by 2π, or by 60" if hertz == 0 else ""
         raise RefusedError(place, f"in {unit}", "frequencies in Hz, kHz or cycles/s", cure)
@@ -160,7 +167,7 @@ def _units_in_comments(path: Path, head_row: int) -> Iterator[Stated]:
             found = re.search(rf"(?<![\w/.])(?<!\d )(?:{pattern})(?!\w)", line, re.IGNORECASE)
             place = f"{path.name}, line {row}"
             is_sampling = re.search(r"(?i)sampl|filter|band|resolution|\bdf\b", line)
-            if found and not is_sampling:
+            if found and (not is_sampling or re.search(r"(?i)\bunit", line)):
                 yield Stated(_hertz_of(place, found[0]), found[0], f"line {row}")
 
 

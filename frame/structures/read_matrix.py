@@ -57,9 +57,16 @@ _SURE = (
 _BEHIND_IN = rf"\bin\s+({_FORCE}|mm|cm|m|ft|t|tons?|Mg|kg|g)(?![\w./])"
 # Units where a line has the word unit, brackets, or "in" and a number.
 _WORD = rf"(?<![\w./])(?:{_FORCE}|{_LENGTH}|t|tons?|Mg|kg|g|slugs?)(?![\w.])"
+# Words of numbers that are no entries in units of SI, whatever units stand beside them.
+_OTHER_NUMBERS = (
+    r"(?i)\b(?:weights?|invers\w+|inverted|compliance|half|halved|doubled|hundreds|thousands|millions"
+    r"|imperial|cgs|us(?:\s+customary)?\s+units|us\s+customary|ratios?|per\s?cent\w*|relative"
+    r"|toneladas?|log(?:10|arithm\w*))\b|%|/\s*(?:mm|cm|in|inch|ft|foot)\b"
+)
 _SPELLED = {
-    "kilo-?newtons?": "kN", "mega-?newtons?": "MN", r"\bnewtons?": "N", r"\s+per\s+": "/",
-    r"milli-?met(?:er|re)s?": "mm", r"\bmet(?:er|re)s?": "m", r"\bmetric tons?": "tonnes",
+    r"kilo[-\s]?newtons?": "kN", r"mega[-\s]?newtons?": "MN", r"\bnewtons?": "N", r"\s+per\s+": "/",
+    r"milli-?met(?:er|re)s?": "mm", r"\bmet(?:er|re)s?": "m",
+    r"\bmetric ton(?:s|nes?)?\b": "tonnes",
 }  # fmt: skip
 
 
@@ -148,6 +155,9 @@ def _stated_factor(path: Path) -> float:
         place = f"{path.name}, line {row}"
         for pattern, symbol in _SPELLED.items():
             line = re.sub(pattern, symbol, line, flags=re.IGNORECASE)
+        other = re.search(_OTHER_NUMBERS, line.lstrip(" \t%#$*/"))
+        allowed = "entries of stiffness, damping or mass in units"
+        require(other is None, place, line.strip()[:60], allowed, cure)
         units = [*re.findall(_QUOTIENT, line), *re.findall(_SURE, line)]
         units += re.findall(_BEHIND_IN, line)
         if re.search(r"(?i)\bunits?\b|[\[(]|\bin\s+\d", line):

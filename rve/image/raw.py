@@ -167,11 +167,20 @@ def read_head(path: Path, sides: Sequence[float], override: Collection[str] = ()
     others = r'\btime\b|"t"|\b(?:list|\w*vector|\w*color|complex|\w*matrix|normal)\b'
     is_other = re.search(others, labels) or {"s", "ms", "sec"} & {u.lower() for u in units}
     require(not is_other, name, f"with another axis, {labels}", "three axes of space")
-    known = ("units", "spacings", "elementspacing", "elementsize", "elementdatafile", "data file")
+    known = (
+        "units",
+        "spacings",
+        "thicknesses",
+        "elementspacing",
+        "elementsize",
+        "elementdatafile",
+        "data file",
+    )
     texts = [f"{key} {value}" for key, value in entries.values.items() if key not in known]
     if not any(units):
         ordered = [unit_in_texts(texts)] * 3
-    require_spacing(name, lengths, sides, ordered, texts=texts, override=override)
+    counts = [int(sizes[axis]) for axis in order]
+    require_spacing(name, lengths, sides, ordered, texts=texts, counts=counts, override=override)
     endian = entries.value("binarydatabyteordermsb", "elementbyteordermsb", "endian")
     # NRRD asks for it beside numbers of several bytes; MetaImage means the little one without it.
     is_stated = bool(endian) or "elementtype" in entries.values or np.dtype(kind).itemsize == 1
@@ -266,9 +275,7 @@ class _Entries:
         lines = start.splitlines(keepends=True)
         for row, line in enumerate(lines, 1):
             size += len(line)
-            key, *value = re.split(
-                r":=|[=:]", line.decode("latin-1").replace("Âµ", "µ").strip(), maxsplit=1
-            )
+            key, *value = re.split(r":=|[=:]", _decoded(line).strip(), maxsplit=1)
             values[key.strip().lower()] = "".join(value).strip()
             is_list = values[key.strip().lower()].startswith("LIST")
             if key.strip() in ("", "ElementDataFile") or is_list:  # raw data may follow
@@ -281,6 +288,14 @@ class _Entries:
     def value(self, *keys: str) -> str:
         """Return the value of the first of some keys that is there; empty where none is."""
         return next((self.values[key] for key in keys if key in self.values), "")
+
+
+def _decoded(line: bytes) -> str:
+    """Return a line as UTF-8, or as Latin-1 where it is none."""
+    try:
+        return line.decode("utf-8")
+    except UnicodeDecodeError:
+        return line.decode("latin-1")
 
 
 def _skipped(name: str, entries: _Entries, *, is_packed: bool) -> int:
@@ -349,6 +364,10 @@ def _layout(name: str, entries: _Entries) -> _Layout:
         is_of_nodes = "node" in entries.value("centerings", "centers")  # at both ends
         spacing = list(np.abs(np.subtract(ends[1], ends[0])) / np.subtract(sizes, is_of_nodes))
     lengths = np.array(spacing or [math.nan] * 3)
+    # A slice's thickness is its distance where none is stated, since slices may overlap.
+    thick = _numbers(name, entries.value("thicknesses"))
+    if len(thick) == 3:
+        lengths = np.where(np.isnan(lengths), thick, lengths)
     # NRRD writes vectors in brackets, which may be as long as a voxel; MetaImage has three names.
     text = entries.value("space directions", "transformmatrix", "rotation", "orientation")
     directions = _numbers(name, re.sub("[()]", " ", text))

@@ -458,6 +458,22 @@ def test_units_of_single_axes_are_compared_and_may_be_overridden(tmp_path, rng):
             (2, 2, 5),
         ),
         ("nrrd", 'spacings: 2 2 0.005\nunits: "um" "um" "mm"', (2, 2, 5)),
+        ("nrrd", "# dx=2um dy=2um dz=5um", (2, 2, 5)),
+        ("mhd", "Comment = x: 2 um, y: 2 um, z: 5 um", (2, 2, 5)),
+        ("nrrd", 'meta:={"dx": 2e-6, "dy": 2e-6, "dz": 5e-6, "unit": "m"}', (2, 2, 5)),
+        ("nrrd", "# 500 px/mm", (2, 2, 5)),
+        ("mhd", "Comment = 12700 dpi", (2, 2, 5)),
+        ("nrrd", "# 500 voxels per mm", (2, 2, 2)),
+        ("nrrd", "# scale: 1 px = 2 um", (2, 2, 5)),
+        ("nrrd", "sampling:=2um;2um;5um", (2, 2, 5)),
+        ("nrrd", "# extent: 14 x 10 x 60 micrometres", (2, 2, 5)),
+        ("mhd", "Comment = field of view 14 um x 10 um x 60 um", (2, 2, 5)),
+        ("nrrd", "spacings: 20000 20000 50000\n# unit: Å", (2, 2, 5)),
+        (
+            "nrrd",
+            'spacings: 2 2 nan\nthicknesses: nan nan 5\nunits: "um" "um" "um"',
+            (2, 2, 5),
+        ),
         (
             "nrrd",
             'space units: "um" "um" "um"\nspace directions: (0,0,5) (0,2,0) (2,0,0)',
@@ -473,8 +489,9 @@ def test_sides_that_heads_state_with_units_are_those_of_the_case(tmp_path, form,
         path = tmp_path / "a.mhd"
         meta_image(path, np.zeros(SHAPE, "u1"), head=f"{line}\n")
     assert read_image(path, spacing=[x * 1e-6 for x in micrometres])
-    with refuses(path.name):
-        read_image(path, spacing=[x * 1e-3 for x in micrometres])
+    for factors in ((1e-3, 1e-3, 1e-3), (3e-6, 1e-6, 1e-6), (1e-6, 3e-6, 1e-6)):
+        with refuses(path.name):
+            read_image(path, spacing=[f * x for f, x in zip(factors, micrometres, strict=True)])
 
 
 @pytest.mark.parametrize(
