@@ -136,7 +136,7 @@ def test_its_options_have_units_ranges_and_words_of_their_own(tmp_path, capfd, e
 
 def test_a_missing_option_is_said_in_the_words_of_its_class(tmp_path, capfd, entry):
     assert main(["check", str(written(tmp_path, CASE, **{'least = "2 kN/m"\n': ""}))]) == 2
-    assert "Smallest stiffness of interest, of all storeys." in capfd.readouterr().err
+    assert "Smallest stiffness of interest, of all storeys" in capfd.readouterr().err
 
 
 def test_without_its_entry_the_section_is_unknown(tmp_path):
