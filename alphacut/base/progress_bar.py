@@ -177,7 +177,7 @@ class _Display:
     def __call__(self, fraction: float) -> None:
         """Show a completed fraction, 0 to 1, unless something was shown just before.
 
-        Elsewhere than on a terminal the line has the time that is left, where it is foretold.
+        The time that is left stands behind it, where it is foretold.
         """
         time_left = ""
         if isinstance(fraction, Foretold) and fraction.seconds_left is not None:
@@ -189,13 +189,13 @@ class _Display:
                 seconds = max(self.end_of_stage - now, 1.0)
                 time_left = f"some {seconds:.0f} s left of this stage"
         self.fraction = fraction
-        self._show(time_left, on_terminal="")
+        self._show(time_left)
 
     def show_compiling(self) -> None:
         """Say that a kernel is being compiled, unless something was shown just before."""
-        self._show("compiling, once", on_terminal=" compiling, once")
+        self._show("compiling, once")
 
-    def _show(self, note: str, *, on_terminal: str) -> None:
+    def _show(self, note: str) -> None:
         """Show the completed fraction on standard error, unless one was shown just before.
 
         On a terminal (`is_terminal`) a bar is drawn over the last one, at most five times a second.
@@ -204,8 +204,7 @@ class _Display:
         `written`, and that there is a bar in `has_bar`.
 
         Args:
-            note: What stands behind the time in a line.
-            on_terminal: What stands behind the time beside a bar.
+            note: What stands behind the time.
         """
         pause = 8.0  # seconds between lines
         if self.is_terminal:
@@ -216,21 +215,19 @@ class _Display:
             return
         try:
             self.written = now
-            self._write_line(elapsed, note, on_terminal=on_terminal)
+            self._write_line(f"{self.fraction:4.0%} after {elapsed:.0f} s", note)
         finally:
             self.turn.release()
 
-    def _write_line(self, elapsed: float, note: str, *, on_terminal: str) -> None:
-        """Write the bar or the line after `elapsed` seconds; arguments are those of `_show`."""
-        if self.is_terminal:
-            self.has_bar = True
-            width = 30
-            full = round(width * self.fraction)
-            bar = "█" * full + "░" * (width - full)
-            _write(f"\r\x1b[K{bar} {self.fraction:4.0%} {elapsed:.0f} s{on_terminal}")
+    def _write_line(self, fraction: str, note: str) -> None:
+        """Write the completed fraction with its time, and a note, as a bar or a line."""
+        line = f"{fraction}, {note}" if note else fraction
+        if not self.is_terminal:
+            _write(f"{line}\n")
             return
-        separator = ", " if note else ""
-        _write(f"{self.fraction:4.0%} after {elapsed:.0f} s{separator}{note}\n")
+        self.has_bar = True
+        full = round(30 * self.fraction)
+        _write(f"\r\x1b[K{'█' * full:░<30} {line}")
 
     def close(self) -> None:
         """Remove the bar, and end its thread."""

@@ -53,6 +53,12 @@ class Content(CellContent):
         return found
 
     @property
+    def asked_alone(self) -> list[AnalysisSection]:
+        """The sections of analyses that are stages of their own, in the order of `stages`."""
+        stages = [stage for stage in self.stages if stage != "envelope"]
+        return [section for stage in stages for section in self.asked(stage).values()]
+
+    @property
     def questions(self) -> dict[str, QuestionSection]:
         """Return those of the sections about the response that state limits of it, by key."""
         asked = self.asked().items()
@@ -189,15 +195,14 @@ class Content(CellContent):
             require(len(mass) > 0, "matrices.mass", None, allowed)
         if "envelope" in self.stages and self.envelope is not None:
             self._require_response(self.envelope, self._one_structure())
-        for stage in self.stages:
-            for section in self.asked(stage).values() if stage != "envelope" else ():
-                structure = self._one_structure()
-                is_possible = self.identify is None or section.made_from.of_learned_set
-                allowed = "without [identify], whose set is no box"
-                require(is_possible, section.key, "beside [identify]", allowed)
-                self._require_inputs(section.key, getattr(section, "fuzzy", ()), structure)
-                self._require_modulus()
-                section.require_answerable(structure, self.component_count)
+        for section in self.asked_alone:
+            structure = self._one_structure()
+            is_possible = self.identify is None or section.made_from.of_learned_set
+            allowed = "without [identify], whose set is no box"
+            require(is_possible, section.key, "beside [identify]", allowed)
+            self._require_inputs(section.key, getattr(section, "fuzzy", ()), structure)
+            self._require_modulus()
+            section.require_answerable(structure, self.component_count)
 
     def _require_excitation(self) -> None:
         """Refuse a structure that starts at rest and has no loads.

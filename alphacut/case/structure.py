@@ -400,13 +400,13 @@ class Frame(StructureSection):
         """
         # Wrong prefixes k, M and G are factors of a thousand and more, while an isolator is some 50
         # times softer than a storey: 300 lies between both.
+        weight = STANDARD_GRAVITY * sum(x.nominal for x in self.per_floor(self.masses))
         max_ratio = 300.0
         for key in ("masses", "lengths", "second_moment", "stiffness", "yield_force"):
             # Without values a single 1 stands for them, so that their ratio is 1.
             sizes = [number.nominal for number in getattr(self, key) or (Crisp(1.0),)]
             if key == "yield_force":
                 # A storey that is to stay elastic has a force that no motion reaches, such as 1 GN.
-                weight = STANDARD_GRAVITY * sum(x.nominal for x in self.per_floor(self.masses))
                 sizes = [size for size in sizes if size < 10 * weight] or [1.0]
             if max(sizes) > max_ratio * min(sizes):
                 ratio = max(sizes) / min(sizes)
@@ -415,7 +415,7 @@ class Frame(StructureSection):
         if tallest > 100:  # m, ten times the height of a tall storey
             yield f"frame.lengths has a storey of {tallest:g} m: is its unit right, m or mm?"
             return
-        yield from self._size_warnings(tallest or 5.0)  # m, a guess where no height is known
+        yield from self._size_warnings(tallest or 5.0, weight)  # m, a guess without heights
         of_columns = ("shear", "base_shear", "overturning_moment")
         shears = [x for x in self.outputs or () if x.rstrip("0123456789") in of_columns]
         if shears and any(any(damper.support) for damper in self.dampers):
@@ -433,11 +433,12 @@ class Frame(StructureSection):
         yield from self._weight_warnings(coefficients)
         yield from self._hardening_warnings(coefficients)
 
-    def _size_warnings(self, height: float) -> Iterator[str]:
+    def _size_warnings(self, height: float, weight: float) -> Iterator[str]:
         """Yield a sentence for each start, yield drift, yield force or gravity of an unusual size.
 
         Args:
             height: Height of the tallest storey in m, or a guess.
+            weight: Weight of all floors in N.
         """
         # `per_floor` gives one value for each floor, where the case may state one for all.
         starts = [x.nominal for x in self.per_floor(self.displacements)]
@@ -448,7 +449,6 @@ class Frame(StructureSection):
         largest = max((x.nominal for x in self.yield_drift or ()), default=0.0)
         if largest > height / 4:
             yield f"frame.yield_drift is up to {largest:.3g} m: is its unit right?"
-        weight = STANDARD_GRAVITY * sum(x.nominal for x in self.per_floor(self.masses))
         fraction = max((x.nominal for x in self.yield_force or ()), default=np.inf) / weight
         # even isolators slide at some 2 % of the weight above them
         if fraction < 0.002:
@@ -540,28 +540,20 @@ class Frame(StructureSection):
         # Stiffnesses need no second moment: None is its absence, which an empty tuple is not.
         arguments["second_moment"] = arguments["second_moment"] or None
         # A number is the ratio of all modes; a tuple must have one ratio for each.
-        if len(ratios) == 1:
-            arguments["damping_ratio"] = ratios["zeta"].nominal
-        elif ratios:
-            arguments["damping_ratio"] = tuple(ratio.nominal for ratio in ratios.values())
-        nominal_modulus = None
-        if young is not None:
-            nominal_modulus = young.nominal
-        # A storey may buckle under its weight with the modulus of a stand-in, and stand with that
-        # which a stage computes.
-        gravity = self.gravity
-        if young is STAND_IN:
-            gravity = 0.0
+        if nominal := [ratio.nominal for ratio in ratios.values()]:
+            arguments["damping_ratio"] = nominal[0] if len(nominal) == 1 else tuple(nominal)
         try:
             model = StoreyFrame(
                 **arguments,
-                modulus=nominal_modulus,
+                modulus=None if young is None else young.nominal,
                 damper_placement=self.damper_placement or "ground",
                 outputs=self.outputs,
                 rayleigh=(self.rayleigh_mass.nominal, self.rayleigh_stiffness.nominal),
                 rayleigh_of=self.rayleigh_of,
                 ground=self.accelerogram,
-                gravity=gravity,
+                # A storey may buckle under its weight with the modulus of a stand-in, and stand
+                # with that which a stage computes.
+                gravity=0.0 if young is STAND_IN else self.gravity,
             )
         except RefusedError as error:
             key = f"frame.{NAMES.get(error.key, error.key)}"

@@ -162,9 +162,8 @@ class Pipeline:
             self.compute_modulus()
         if "envelope" in stages:
             self._compute_motion()
-        for stage in stages:
-            if stage not in ("microstructure", "modulus", "envelope"):
-                self._compute_alone(stage)
+        for analysis in self.content.asked_alone:
+            self._compute_alone(analysis)
         if self.content.shares:
             self._compute_shares()
         return results
@@ -269,8 +268,8 @@ class Pipeline:
             peaks = self._limited_peaks(task, structure)
             response: dict[str, Any] = {"peaks": peaks, **task.times}
             asked = replace(asked_of(structure, task.fuzzy, section.alpha), **response)
-        for key, question in content.asked().items():
-            self._answer(key, question, structure, asked)
+        for question in content.asked().values():
+            self._answer(question, structure, asked)
 
     def _structure(self) -> Structure:
         """Return the structure with the material that stage modulus found, if there is one."""
@@ -285,8 +284,8 @@ class Pipeline:
         assert structure is not None
         return structure
 
-    def _compute_alone(self, stage: str) -> None:
-        """Compute the answers of a stage that is an analysis of the structure, without a response.
+    def _compute_alone(self, section: AnalysisSection) -> None:
+        """Compute the answers to an analysis of the structure without a response.
 
         Raises:
             RefusedError: An input, output or limit does not fit the structure.
@@ -294,26 +293,22 @@ class Pipeline:
         """
         content = self.content
         self.results.structure = structure = self._structure()
-        for key, section in content.asked(stage).items():
-            motions: dict[str, Any] = {}
-            is_moved = section.made_from.records != "refused"
-            if is_moved and content.records is not None and content.envelope is not None:
-                # Spectra are those of whole records, so that the motions last as long.
-                whole = content.envelope.model_copy(update={"duration": inf})
-                motions["records"] = suite.suite_records(content.records, whole, structure)
-                motions["step"] = content.envelope.step
-            fuzzy, alpha = (getattr(section, name) for name in ("fuzzy", "alpha"))
-            asked = replace(asked_of(structure, fuzzy, alpha), **motions)
-            self._answer(key, section, structure, asked)
+        motions: dict[str, Any] = {}
+        is_moved = section.made_from.records != "refused"
+        if is_moved and content.records is not None and content.envelope is not None:
+            # Spectra are those of whole records, so that the motions last as long.
+            whole = content.envelope.model_copy(update={"duration": inf})
+            motions["records"] = suite.suite_records(content.records, whole, structure)
+            motions["step"] = content.envelope.step
+        fuzzy, alpha = (getattr(section, name) for name in ("fuzzy", "alpha"))
+        self._answer(section, structure, replace(asked_of(structure, fuzzy, alpha), **motions))
 
-    def _answer(
-        self, key: str, section: AnalysisSection, structure: Structure, asked: Asked
-    ) -> None:
+    def _answer(self, section: AnalysisSection, structure: Structure, asked: Asked) -> None:
         """Compute the answer to the question of a section, and what else follows from it."""
         kept = self.results.answers
         question = section.question(structure)
-        stage = answers.stage(key, [section, asked], partial(question.answer, asked))
-        kept[key] = found = self.store.take(stage).numbers
+        stage = answers.stage(section.key, [section, asked], partial(question.answer, asked))
+        kept[section.key] = found = self.store.take(stage).numbers
         for name, further in question.further(asked, found).items():
             kept[name] = self.store.take(answers.stage(name, [section, asked], further)).numbers
 

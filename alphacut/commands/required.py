@@ -46,10 +46,9 @@ def require_runnable(content: Content) -> Built:
         study_of_image = _require_material(content)
     if "envelope" in content.stages:
         records = _require_motion(content)
-    for stage in content.stages:
-        for section in content.asked(stage).values() if stage != "envelope" else ():
-            assert content.structure is not None  # as the case was checked for
-            section.require_computable(content.structure, ())
+    for section in content.asked_alone:
+        assert content.structure is not None  # as the case was checked for
+        section.require_computable(content.structure, ())
     return Built(study_of_image, records)
 
 
