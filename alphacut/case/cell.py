@@ -57,16 +57,12 @@ class CellContent(Section, defer_build=True):
     @property
     def image_cell(self) -> ImageCell | None:
         """The cell if it is an image."""
-        if isinstance(self.cell, ImageCell):
-            return self.cell
-        return None
+        return self.cell if isinstance(self.cell, ImageCell) else None
 
     @property
     def particle_cell(self) -> RoundCell | None:
         """The cell if it has one particle."""
-        if isinstance(self.cell, RoundCell):
-            return self.cell
-        return None
+        return self.cell if isinstance(self.cell, RoundCell) else None
 
     @property
     def has_spheres(self) -> bool:
@@ -83,16 +79,12 @@ class CellContent(Section, defer_build=True):
     @property
     def mesh_cell(self) -> MeshedCell | None:
         """The cell if its mesh comes from a file."""
-        if isinstance(self.cell, MeshedCell):
-            return self.cell
-        return None
+        return self.cell if isinstance(self.cell, MeshedCell) else None
 
     @property
     def radius_map(self) -> RadiusMapSection | None:
         """The radius map of [radius], if there is one."""
-        if isinstance(self.radius, RadiusMapSection):
-            return self.radius
-        return None
+        return self.radius if isinstance(self.radius, RadiusMapSection) else None
 
     @property
     def radius_and_cell(
@@ -144,8 +136,9 @@ class CellContent(Section, defer_build=True):
         if self.mesh.file is None:
             allowed = "a mesh of Gmsh beside [cell.phases]"
             require(self.mesh_cell is None, "mesh.file", None, allowed)
-            require(not self.mesh.refine, "mesh.refine", True, "true beside mesh.file")
-            require(not self.mesh.bounds, "mesh.bounds", True, "true beside mesh.file")
+            for key in ("refine", "bounds"):
+                is_meant = not getattr(self.mesh, key)
+                require(is_meant, f"mesh.{key}", True, "true beside mesh.file")
             # `radius_map` is [radius] if it has a1 … a4, else None.
             is_complete = self.radius is None or self.radius_map is not None
             about = RadiusMapSection.described_fields()["a1"].description
@@ -184,13 +177,12 @@ class CellContent(Section, defer_build=True):
         has_fraction = self.particle_cell is not None and self.particle_cell.fraction is not None
         is_computed = "microstructure" in self.stages
         needs_radius = not (is_computed or has_fraction or self.image_cell or self.mesh_cell)
+        needed = {"modulus": ("radius", "cell") if needs_radius else ("cell",)}
         for stage in self.stages:
-            if stage != "modulus":
-                self._require_section(stage, stage)
-                continue
-            if needs_radius:
-                self._require_section(stage, "radius")
-            self._require_section(stage, "cell")
+            # An empty section is there: its keys have defaults, or are told as missing.
+            for key in needed.get(stage, (stage,)):
+                is_there = getattr(self, key) is not None
+                require(is_there, key, None, f"[{key}], which stage {stage} needs")
         has_radius = self.radius is not None
         require_alone("radius", has_radius and is_computed, "stage microstructure")
         require_alone("radius", has_radius and has_fraction, "cell.fraction")
@@ -207,11 +199,6 @@ class CellContent(Section, defer_build=True):
             methods = self.cell.methods
             allowed = f"{', '.join(methods)} for this cell"
             require(method in methods, "modulus.method", method, allowed)
-
-    def _require_section(self, stage: str, key: str) -> None:
-        # An empty section is there: its keys have defaults, or are told as missing.
-        is_there = getattr(self, key) is not None
-        require(is_there, key, None, f"[{key}], which stage {stage} needs")
 
 
 class CellCase(CellContent):

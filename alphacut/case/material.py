@@ -135,8 +135,8 @@ class PhaseSection(Section):
         is_isotropic = isinstance(self.modulus, FuzzyNumber)
         has_ratio = self.poisson is not None
         allowed = "poisson beside Young's modulus, none beside a stiffness"
-        require(has_ratio or not is_isotropic, "", "without poisson", allowed)
-        require(is_isotropic or not has_ratio, "", "with poisson", allowed)
+        value = "with poisson" if has_ratio else "without poisson"
+        require(has_ratio == is_isotropic, "", value, allowed)
 
     @property
     def nominal(self) -> Phase | VoigtPhase:
@@ -263,13 +263,10 @@ class RoundCell(Section):
         Young's moduli are in Pa. A particle that is given by a stiffness matrix has neither
         inclusion_modulus nor inclusion_poisson.
         """
-        constants: dict[str, FuzzyNumber] = {}
         names = ("matrix_modulus", "matrix_poisson", "inclusion_modulus", "inclusion_poisson")
-        for name in names:
-            number = getattr(self, name)
-            if isinstance(number, FuzzyNumber):  # no stiffness of three rows
-                constants[name] = number
-        return constants
+        numbers = {name: getattr(self, name) for name in names}
+        # a stiffness of three rows is none
+        return {name: x for name, x in numbers.items() if isinstance(x, FuzzyNumber)}
 
     @property
     def outline(self) -> Ellipse | None:
@@ -284,23 +281,17 @@ class RoundCell(Section):
         """
         if self.particles in ("cylinders", "spheres"):
             return None
-        match = re.fullmatch(r"ellipses\(([^,]*),([^,]*)\)", self.particles)
+        number = r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*"
+        match = re.fullmatch(rf"ellipses\({number},{number}\)", self.particles)
         if match is None:
             raise RefusedError("cell.particles", self.particles, SHAPES)
-        try:
-            aspect = float(match[1])
-            degrees = float(match[2])
-        except ValueError:
-            raise RefusedError("cell.particles", self.particles, SHAPES) from None
-        return Ellipse(aspect, degrees)
+        return Ellipse(*map(float, match.groups()))
 
     @property
     def stiffness(self) -> VoigtPhase | None:
         """The particle where it is not isotropic."""
         modulus = self.inclusion_modulus
-        if isinstance(modulus, VoigtPhase):
-            return modulus
-        return None
+        return modulus if isinstance(modulus, VoigtPhase) else None
 
     @property
     def particle_kind(self) -> str:
@@ -363,8 +354,7 @@ class RoundCell(Section):
         is_isotropic = self.stiffness is None
         key = "cell.inclusion_poisson"
         allowed = "a number beside Young's modulus, none beside a stiffness"
-        require(has_ratio or not is_isotropic, key, "missing", allowed)
-        require(is_isotropic or not has_ratio, key, "there", allowed)
+        require(has_ratio == is_isotropic, key, "there" if has_ratio else "missing", allowed)
         is_solved = is_isotropic or self.particles != "spheres"
         allowed = "Young's modulus of spheres"
         require(is_solved, "cell.inclusion_modulus", "a plane stiffness", allowed)
