@@ -61,6 +61,7 @@ if TYPE_CHECKING:
     )
     from alphacut.frame.spectra.target import TargetSpectrum, read_spectrum
     from alphacut.frame.structures.affine import affine_terms
+    from alphacut.frame.structures.isolator import BilinearIsolator
     from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
     from alphacut.frame.structures.loads import Force
     from alphacut.frame.structures.material_damping import damping_from_loss
@@ -70,20 +71,21 @@ if TYPE_CHECKING:
     from alphacut.frame.structures.storey import StoreyFrame
 
 __all__ = [
-    "INTEGRATORS", "METHODS", "Accelerogram", "AnglePeaks", "Auto", "Decision", "DualProof",
-    "Envelope", "Exact", "FloorSpectrum", "Force", "Fragility", "GraphFollower", "History",
-    "Identified", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem", "LearnedInputs",
-    "Limit", "LinearFlow", "MatrixStructure", "MeasuredMode", "Midpoint", "Output", "Parameter",
-    "Peak", "Prediction", "Predictions", "Probability", "Proof", "RefutedError", "RotatedSpectra",
-    "Sampled", "ScaledPeaks", "ScaledSuite", "Sensitivity", "SpectrumAccuracy", "SpectrumChecks",
-    "SpectrumResponse", "StaticBounds", "StoreyFrame", "SuitePeaks", "TargetSpectrum", "Tolerances",
-    "UnprovedError", "affine_terms", "asce7_multi_period", "asce7_two_period", "damping_from_loss",
-    "decide", "drift_sensitivity", "envelope", "eurocode8_spectrum", "floor_spectrum", "fragility",
-    "identify", "incremental", "learned_envelope", "measured_mode", "over_angles", "over_records",
-    "peaks", "pendulum", "probability", "read_matrix", "read_modes", "read_record", "read_spectrum",
-    "read_suite", "read_unknowns", "record_spectrum", "require_envelope", "response_spectrum",
-    "rotated_spectra", "scale_suite", "sensitivity", "spectral_acceleration", "spectrum_accuracy",
-    "spectrum_checks", "spectrum_response", "static_bounds", "tolerances",
+    "INTEGRATORS", "METHODS", "Accelerogram", "AnglePeaks", "Auto", "BilinearIsolator", "Decision",
+    "DualProof", "Envelope", "Exact", "FloorSpectrum", "Force", "Fragility", "GraphFollower",
+    "History", "Identified", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem",
+    "LearnedInputs", "Limit", "LinearFlow", "MatrixStructure", "MeasuredMode", "Midpoint", "Output",
+    "Parameter", "Peak", "Prediction", "Predictions", "Probability", "Proof", "RefutedError",
+    "RotatedSpectra", "Sampled", "ScaledPeaks", "ScaledSuite", "Sensitivity", "SpectrumAccuracy",
+    "SpectrumChecks", "SpectrumResponse", "StaticBounds", "StoreyFrame", "SuitePeaks",
+    "TargetSpectrum", "Tolerances", "UnprovedError", "affine_terms", "asce7_multi_period",
+    "asce7_two_period", "damping_from_loss", "decide", "drift_sensitivity", "envelope",
+    "eurocode8_spectrum", "floor_spectrum", "fragility", "identify", "incremental",
+    "learned_envelope", "measured_mode", "over_angles", "over_records", "peaks", "pendulum",
+    "probability", "read_matrix", "read_modes", "read_record", "read_spectrum", "read_suite",
+    "read_unknowns", "record_spectrum", "require_envelope", "response_spectrum", "rotated_spectra",
+    "scale_suite", "sensitivity", "spectral_acceleration", "spectrum_accuracy", "spectrum_checks",
+    "spectrum_response", "static_bounds", "tolerances",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "INTEGRATORS": "dynamics.integrators",
@@ -91,6 +93,7 @@ AT_FIRST_USE = {
     "Accelerogram": "records.history",
     "AnglePeaks": "analyses.angles",
     "Auto": "methods.auto",
+    "BilinearIsolator": "structures.isolator",
     "Decision": "analyses.decision",
     "DualProof": "methods.dual",
     "Envelope": "result",

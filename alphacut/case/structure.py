@@ -17,6 +17,7 @@ from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.case.types import Modulus, NotEmpty, OneOrMany, Quantity, Section, case_file, text
 from alphacut.frame import (
     Accelerogram,
+    BilinearIsolator,
     Identified,
     StoreyFrame,
     damping_from_loss,
@@ -27,7 +28,7 @@ from alphacut.frame.structures.linear import LinearSystem, has_matrices
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.quantities import OF_STOREY_FRAME
 from alphacut.frame.structures.storey import SYMBOLS
-from alphacut.fuzzy import Crisp, FuzzyNumber
+from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
 from alphacut.io.files import suggestion
 
 
@@ -316,6 +317,63 @@ class StructureSection(Section):
         yield from ()
 
 
+class Isolator(Section):
+    """Bilinear isolators below the first floor; the storeys above stay elastic.
+
+    Property modification factors λ (ASCE 7, chapter 17) make stiffness (k1) and strength fuzzy.
+
+    Args:
+        period: period of the whole mass on the stiffness after yielding.
+        strength: characteristic strength: force at zero displacement while yielding.
+        strength_ratio: that over the weight, in place of strength.
+        hardening: stiffness after yielding over the initial one.
+        lambda_min: smallest factor of stiffness and strength.
+        lambda_max: largest factor of stiffness and strength.
+        linked: whether one factor holds for both, so that k1 alone is fuzzy; else fy1 is, too.
+    """
+
+    period: Annotated[float, Quantity("s", above=0)]
+    strength: Annotated[float, Quantity("N", above=0)] | None = None
+    strength_ratio: Annotated[float, Quantity(above=0, below=1)] | None = None
+    hardening: Annotated[float, Quantity(above=0, below=1)] = 0.1
+    lambda_min: Annotated[float, Quantity(above=0, maximum=1)] = 1.0
+    lambda_max: Annotated[float, Quantity(minimum=1)] = 1.0
+    linked: bool = False
+
+    def storeys(self, masses: Sequence[FuzzyNumber]) -> dict[str, tuple[FuzzyNumber, ...]]:
+        """Return stiffness of the isolated storey, and yield points and hardening of all storeys.
+
+        Raises:
+            RefusedError: Not one of both kinds of strength is given.
+        """
+        is_one = (self.strength is None) != (self.strength_ratio is None)
+        require(is_one, "frame.isolator.strength", None, "either strength or strength_ratio")
+        mass = sum(x.nominal for x in masses)
+        strength = self.strength or (self.strength_ratio or 0.0) * mass * STANDARD_GRAVITY
+        found = BilinearIsolator.of(
+            mass, period=self.period, strength=strength, hardening=self.hardening
+        )
+        above = len(masses) - 1
+        # A storey of hardening 1 is elastic whatever its yield point is.
+        never = Crisp(found.yield_force)
+        storeys: dict[str, tuple[FuzzyNumber, ...]] = {
+            "stiffness": (self._fuzzy(found.stiffness),),
+            "hardening": (Crisp(found.hardening), *[Crisp(1.0)] * above),
+        }
+        if self.linked:  # a crisp yield drift: the yield force is proportional to the stiffness
+            drift = Crisp(found.yield_force / found.stiffness)
+            storeys["yield_drift"] = (drift,) * (above + 1)
+        else:
+            storeys["yield_force"] = (self._fuzzy(found.yield_force), *[never] * above)
+        return storeys
+
+    def _fuzzy(self, nominal: float) -> FuzzyNumber:
+        """Return the fuzzy number between both factors of a nominal value."""
+        if self.lambda_min == self.lambda_max:
+            return Crisp(nominal)
+        return Triangular(self.lambda_min * nominal, nominal, self.lambda_max * nominal)
+
+
 class Frame(StructureSection):
     """Storey frame: rigid floors on elastic columns, numbered from the ground.
 
@@ -360,6 +418,7 @@ class Frame(StructureSection):
     yield_force: OneOrMany[YieldForce] | None = None
     yield_drift: OneOrMany[YieldDrift] | None = None
     hardening: OneOrMany[Hardening] | None = None
+    isolator: Isolator | None = None
     gravity: Annotated[float, Quantity("m/s^2", minimum=0)] = 0.0
     damping_ratio: DampingRatios = ()
     dampers: OneOrMany[Damping] = (ZERO,)
@@ -380,7 +439,7 @@ class Frame(StructureSection):
     @property
     def needs_modulus(self) -> bool:
         """Whether neither a modulus nor stiffnesses are stated."""
-        return self.modulus is None and self.stiffness is None
+        return self.modulus is None and self.stiffness is None and self.isolator is None
 
     @property
     def moves_by_itself(self) -> bool:
@@ -524,11 +583,13 @@ class Frame(StructureSection):
         """
         # One number for each floor or storey, by the names of the arguments of `StoreyFrame`.
         lists = {name: self.per_floor(getattr(self, NAMES.get(name, name))) for name in SYMBOLS}
+        if self.isolator is not None:
+            lists |= self._with_isolator(self.isolator)
         # A single second moment is one parameter "I" of all storeys, so it is not repeated.
         lists["second_moment"] = self.second_moment or ()
         # The stiffness of a storey follows from columns and modulus, 12 c E I / l³ of c columns
         # clamped at both ends; where it is given, it needs neither.
-        if self.stiffness:
+        if lists["stiffness"]:
             lists["columns"] = ()
             young = self.modulus
         else:
@@ -575,6 +636,26 @@ class Frame(StructureSection):
         for z, height in enumerate(lists["lengths"], start=1):
             heights[f"drift{z}"] = heights[f"residual{z}"] = height
         return Structure(model, by_name, heights)
+
+    def _with_isolator(self, isolator: Isolator) -> dict[str, tuple[FuzzyNumber, ...]]:
+        """Return what isolators below the first floor give, with the stiffnesses above them.
+
+        Raises:
+            RefusedError: A yield point is given besides, or stiffnesses are not those of the
+                storeys above.
+        """
+        for key in ("yield_force", "yield_drift", "hardening"):
+            is_absent = getattr(self, key) is None
+            require(is_absent, f"frame.{key}", "beside frame.isolator", "one of both")
+        found = isolator.storeys(self.per_floor(self.masses))
+        above = self.stiffness or ()
+        if len(above) == 1:
+            above *= self.floors - 1
+        allowed = f"{self.floors - 1}, one for each storey above the isolators"
+        is_complete = len(above) == self.floors - 1
+        require(is_complete, "frame.stiffness", f"a list of {len(above)}", allowed)
+        found["stiffness"] = (*found["stiffness"], *above)
+        return found
 
     def require_consistent(self) -> None:
         """Refuse a frame without a word on damping, or with contradictory or impossible values.

@@ -1,0 +1,85 @@
+"""Isolators of a case by period, strength and factors λ, against the storey that they mean."""
+
+import numpy as np
+import pytest
+
+from alphacut.case.content import load
+from alphacut.frame import BilinearIsolator
+from alphacut.frame.dynamics.yielding import YieldingFlow
+from tests.alphacut.small import refusals
+from tests.refused import refuses
+
+CASE = """
+title = "A floor on isolators"
+stages = ["envelope"]
+[frame]
+masses = ["60 t", "40 t"]
+stiffness = "100 MN/m"
+isolator = { period = "2 s", hardening = 0.2, ISOLATOR }
+damping_ratio = "5 %"
+velocities = "1 m/s"
+OTHERS
+[envelope]
+fuzzy = ["k1"]
+alpha = [0]
+duration = "1 s"
+step = "0.02 s"
+"""
+STRENGTH = 'strength_ratio = "5 %"'
+FACTORS = f"{STRENGTH}, lambda_min = 0.8, lambda_max = 1.3"
+
+
+def written(folder, isolator, others=""):
+    path = folder / "case.toml"
+    path.write_text(CASE.replace("ISOLATOR", isolator).replace("OTHERS", others), encoding="utf-8")
+    return path
+
+
+def test_stiffness_after_yielding_has_the_period_and_the_force_the_strength(tmp_path):
+    structure = load(str(written(tmp_path, FACTORS))).content.structure
+    k = 100e3 * np.pi**2 / 0.2
+    force = 0.05 * 100e3 * 9.80665 / 0.8
+    assert structure.numbers["k1"].support == pytest.approx((0.8 * k, 1.3 * k))
+    assert structure.numbers["k1"].nominal == pytest.approx(k)
+    assert structure.numbers["fy1"].support == pytest.approx((0.8 * force, 1.3 * force))
+    assert structure.model.hardening == (0.2, 1.0)
+    by_force = FACTORS.replace(STRENGTH, f'strength = "{0.05 * 100e3 * 9.80665} N"')
+    same = load(str(written(tmp_path, by_force))).content.structure
+    assert same.numbers["fy1"].nominal == pytest.approx(force)
+
+
+def test_a_linked_factor_of_k1_changes_stiffness_and_strength(tmp_path):
+    linked = load(str(written(tmp_path, f"{FACTORS}, linked = true"))).content.structure
+    free = load(str(written(tmp_path, FACTORS))).content.structure
+    assert "fy1" not in linked.numbers
+    k = linked.numbers["k1"].nominal
+    force = free.numbers["fy1"].nominal
+    for factor in (0.8, 1.0, 1.3):
+        (of_one,) = YieldingFlow(linked.model, ("k1",), 1.0, 0.02).values(np.array([[factor * k]]))
+        both = np.array([[factor * k, factor * force]])
+        (of_both,) = YieldingFlow(free.model, ("k1", "fy1"), 1.0, 0.02).values(both)
+        assert of_one == pytest.approx(of_both, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("isolator", "others", "words"),
+    [
+        ("linked = true", "", "either strength or strength_ratio"),
+        (f'{STRENGTH}, strength = "1 kN"', "", "either strength or strength_ratio"),
+        (f"{STRENGTH}, lambda_min = 1.1", "", "lambda_min"),
+        (STRENGTH, 'yield_force = "1 kN"', "frame.yield_force"),
+        (STRENGTH, 'displacements = ["0 m", "0 m", "0 m"]', "displacements"),
+    ],
+)
+def test_isolators_that_contradict_are_refused(tmp_path, isolator, others, words):
+    (line,) = refusals(written(tmp_path, isolator, others))
+    assert words in line
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("period", 0.0), ("strength", -1.0), ("hardening", 1.0), ("mass", np.nan)]
+)
+def test_an_isolator_that_cannot_be_is_refused(key, value):
+    numbers = {"mass": 1e5, "period": 2.0, "strength": 5e4, "hardening": 0.1} | {key: value}
+    with refuses(key):
+        BilinearIsolator.of(**numbers)
