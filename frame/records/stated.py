@@ -33,7 +33,11 @@ _SPELLED = {
     # The acceleration of gravity, as "g = 9.81 m/s2".
     r"(?:\bg\s*=\s*)?\b(?:9\.8\d*\s*\(?m|98[01]\.?\d*\s*\(?(?:cm|gal)|386\.\d*\s*in"
     r"|32\.\d*\s*ft)\S*": "",
-    r"(?<=\bacc)(\w*\.?)\s*/\s*\(": r"\1 (",
+    r"(?<=\bacc)(\w*\.?)\s*/\s*\(?": r"\1 (",
+    # Systems of units, and the symbol of standard gravity.
+    r"\bcgs\b": "(cm/s^2)",
+    r"\bSI\s+units?\b|\bunits?\W+SI\b": "(m/s^2)",
+    r"\bg_n\b(?!\s*=)": "(g)",
     r"\blengths?\W+(?:units?\W+|in\W+)?([cm]?m|in|ft)\b(?=.*\btimes?\W.*\bs(?:ec)?\b)": r"\1/s^2",
 }
 _SPELLED_WORDS = re.compile("|".join(_SPELLED), re.IGNORECASE)
@@ -65,7 +69,8 @@ _RATE = (
     r"(?=(?:(?!filt|pass|corner|cut|band)[^\d\n]){0,20}[\d.]+\s*k?hz))"
 )
 _BEHIND = (
-    r"[\s_]*(?:between\s+\w+\s*)?(?:[\[(](?P<before>[^\])]*)[\])])?[\s:=@\"']*"
+    r"[\s_]*(?:between\s+\w+\s*)?(?:[\[(](?P<before>[^\])]*)[\])]|/\s*(?P<slash>[mµu]?s)\b)?"
+    r"(?:[\s:=@\"',]|\.{2,})*"
     r"(?:(?:is|was|of|at|with|by)\s+)?"
 )
 
@@ -103,7 +108,8 @@ class TextStatements:
             # As "1/100 sec".
             text = re.sub(r"\b1/(\d{2,5})(?=\s*s)", lambda x: f"{1 / int(x[1]):.9g}", text)
             place = f"line {file.line_number(row)}"
-            found._add_units(text, row, place)
+            for clause in text.split(";"):
+                found._add_units(clause, row, place)
             found.steps += _steps(text, place)
             pattern = (
                 r"\b(?:npts?|ndata|n_?samples|points|samples|n(?:umber|o|um|r)?\.?\s*(?:of)?\s*"
@@ -152,13 +158,17 @@ class TextStatements:
                 self.quantities.append((f"{name} by its unit {unit}", row))
         # Loads, angles and drifts of an instrument or a site are no quantity of the numbers.
         name = named_quantity(text)
-        is_quantity = name.endswith(("displacement", "velocity", "spectrum", "counts", "voltage"))
+        is_quantity = name.endswith(
+            ("displacement", "velocity", "spectrum", "counts", "voltage", "jerk", "acceleration")
+        )
         if is_quantity and not is_peak and not re.search(is_of_site, text):
             self.quantities.append((name, row))
 
 
 def named_quantity(text: str) -> str:
     """Return the quantity that a line names, as "a velocity"; empty of an acceleration or none."""
+    if other := re.search(r"\b(?:jerk|(?:angular|rotational)\s+acc\w*)", text, re.IGNORECASE):
+        return "a jerk" if other[0].lower() == "jerk" else "an angular acceleration"
     if re.search(r"(?:\b|_)(?:a|acc(?:el(?:s|eration\w*)?)?|ag)(?:\b|_)", text, re.IGNORECASE):
         return ""
     words_of_quantities = {
@@ -186,8 +196,9 @@ def _steps(text: str, place: str) -> Iterator[Stated]:
         rf"|\b(?:every\s|spaced\s+at\s|intervals?\s+of\s|time\s*[\[(])\s*(?P<number2>\d*\.?\d+)\s*(?P<unit2>[a-zµμ]+)"
     )
     for match in re.finditer(interval, text, re.IGNORECASE):
-        unit = (match["before"] or match["unit"] or "").strip()
-        is_bare = match["before"] is None and not match["unit"]
+        before = match["before"] or match["slash"]
+        unit = (before or match["unit"] or "").strip()
+        is_bare = before is None and not match["unit"]
         # "time 12 s" is a time, and "sampling 100" has no unit.
         words = r"(?i)interval|step|period|spacing|increment|d(?:elta)?_?\s?t|Δt|delta"
         is_sampling = not is_bare and re.match(r"(?i)sampl", match[0]) is not None

@@ -514,7 +514,7 @@ def _unit_of(
     if "unit" in override and unit:
         own = own[:1]
     elif label.unit and acceleration_factor(label.unit) is None and not found.units:
-        raise table.refusal(f"{label.unit} is no unit of accelerations: mend the head")
+        raise table.refusal(f"{label.unit[:40]} is no unit of accelerations: mend the head")
     elif factors := [*found.factors, *of_heads.factors]:
         cure = 'multiply the numbers by it, or say unit and override = ["unit"]'
         text = file.lines[factors[0]].strip()

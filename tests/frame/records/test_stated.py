@@ -222,6 +222,15 @@ HEADS = [
     ("time interval between points 0.005 sec; in cm per sec per sec\n", COLUMN, 0.005, 0.01),
     ("Rate: 100\nUnits: gal\n", COLUMN, 0.01, 0.01),
     ("Acceleration (g) vs time (1/100 s)\n", (",", 100), 0.01, G),
+    ("UNIT.........: GAL\nDT...........: 0.01\n", COLUMN, 0.01, 0.01),
+    ("Sample Interval (msec),10\nUnit,gal\n", COLUMN, 0.01, 0.01),
+    ("dt/ms: 10\nacc/gal\n", COLUMN, 0.01, 0.01),
+    ("Full-scale 2 g; data in gal; 100 sps\n", COLUMN, 0.01, 0.01),
+    ("Outcrop motion, CGS units, dt=0.01\n", COLUMN, 0.01, 0.01),
+    ("# SI units\n# dt = 0.01\n", COLUMN, 0.01, 1.0),
+    ("values are fractions of g_n, dt = 0.01\n", COLUMN, 0.01, G),
+    ("jerk (m/s^3)\ndt 0.01\n", COLUMN, 0.01, None),
+    ("angular acceleration [rad/s^2], dt 0.01 s\n", COLUMN, 0.01, None),
 ]
 """Heads with the layout of the numbers, their step in s, and their unit in m/s²; None of others."""
 
