@@ -14,6 +14,7 @@ import numpy as np
 
 from alphacut.base.apart import read_apart
 from alphacut.base.array_files import Numbers
+from alphacut.base.arrays import Ints
 from alphacut.base.errors import require
 from alphacut.base.extras import extra_named
 from alphacut.frame.structures.entry_lists import NamedMatrix, chosen_place
@@ -73,13 +74,15 @@ def arrays_of_full(path: Path, *, member: str, max_rows: int) -> dict[str, Numbe
         directions, so that these are known.
 
     Raises:
-        RefusedError: The matrix is too large, is not there, or has an index outside of it.
+        RefusedError: The matrix is too large, is not there, has an index outside of it, or
+            disagrees with the counts in the head.
         Exception: Whatever ansys-mapdl-reader raises.
     """
     from ansys.mapdl.reader.full import FullFile
 
     full = FullFile(path)
     require_size(path.name, (full.neqn, full.neqn), max_rows)
+    _require_counts(path, full.read_record(103), member)
     # Behind the head, which begins at word 103, stand the directions that unknowns have.
     _, n_words = full.read_record(103, return_bufsize=True)
     directions = full.read_record(103 + n_words)
@@ -98,3 +101,42 @@ def arrays_of_full(path: Path, *, member: str, max_rows: int) -> dict[str, Numbe
         unknowns[:, 1] = directions[unknowns[:, 1]]
     matrix = triangle.toarray()[np.ix_(free, free)]
     return {"matrix": matrix, "unknowns": unknowns, "is_named": np.array(is_named)}
+
+
+def _require_counts(path: Path, head: Ints, member: str) -> None:
+    """Raise RefusedError unless the counts in the head of a file are those of its records.
+
+    Each unknown has a record of the rows of its entries, with a record of as many numbers of eight
+    bytes behind it. A record is its length in words of four bytes, a flag, and the words; the
+    length stands behind it again.
+
+    Args:
+        path: The file.
+        head: Items of fdfull.inc, from the first one.
+        member: "K" or "M", whose records are counted.
+    """
+    words = np.fromfile(path, "<i4")
+
+    def length_at(position: int) -> int:
+        """Return the number of words in the record there; −1 where there is no whole one."""
+        length = int(words[position]) if 0 <= position < len(words) else -1
+        end = position + 2 + length
+        is_whole = length >= 0 and end < len(words) and words[end] == length
+        return length if is_whole else -1
+
+    n_unknowns, n_nodes, first_of_nodes = int(head[1]), int(head[32]), int(head[35])
+    first, term_count = (head[18], head[8]) if member == "K" else (head[26], head[33])
+    # How many directions each node has.
+    directions = words[first_of_nodes + 2 :][: max(length_at(first_of_nodes), 0)]
+    agree = len(directions) == n_nodes and int(directions.sum()) == n_unknowns
+    n_terms = 0
+    position = int(first)
+    for _ in range(n_unknowns if agree and term_count else 0):
+        length = length_at(position)
+        position += length + 3
+        agree = agree and length >= 0 and length_at(position) == 2 * length
+        position += 2 * length + 3
+        n_terms += length
+    cure = "let MAPDL write the file anew"
+    allowed = "counts of its records"
+    require(agree and n_terms == term_count, path.name, "of counts that disagree", allowed, cure)
