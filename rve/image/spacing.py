@@ -110,9 +110,9 @@ def _sides_in(text: str, counts: Sequence[int]) -> Iterator[tuple[int, Stated]]:
     # Voxels in a length, as "500 px/mm" or "12700 dpi".
     per_length = rf"{_NUMBER}\s*(?:(vox|pix|px)\w*\s*(?:/|per)\s*({_UNITS})(?![a-z])|[dp]pi\b)"
     for match in re.finditer(per_length, text, re.IGNORECASE):
-        length = METRES[(match[3] or "inch").lower()] / (float(match[1]) or math.nan)
+        side = METRES[(match[3] or "inch").lower()] / (float(match[1]) or math.nan)
         n_axes = 3 if match[2] == "vox" else 2  # a pixel lies in a slice
-        yield from ((axis, Stated(length, match[0])) for axis in range(n_axes))
+        yield from ((axis, Stated(side, match[0])) for axis in range(n_axes))
     for match in re.finditer(_SIDES, text, re.IGNORECASE):
         axis_word, what, first, second, third, unit = match.groups()
         # Slices lie along z, and a pixel lies in a slice.
