@@ -14,6 +14,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import FailedError
+from alphacut.base.number_text import engineering
 from alphacut.base.progress_bar import Progress
 from alphacut.frame.bounds.interpolated_box import InterpolatedFrame
 from alphacut.frame.boxes import Boxes, UnitFlow
@@ -21,6 +22,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.yielding import MAX_IMBALANCE, YieldingFlow
 from alphacut.frame.methods.sampled import independent_points
 from alphacut.frame.result import Ends, Envelope
+from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.frame.threshold import Threshold
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import corners
@@ -297,7 +299,7 @@ class _Search:
         return float(1 - left / total)
 
     def open_ranges(self, names: Sequence[str]) -> str:
-        """Name the ranges of inputs that are open, in SI units; empty if there are none."""
+        """Name the ranges of inputs that are open, in their units; empty if there are none."""
         active = np.flatnonzero(self.high > self.low)
         if not self.open:
             return ""
@@ -308,7 +310,11 @@ class _Search:
             shown = [(low, high)]
         texts = []
         for begin, end in shown:
-            ranges = [f"{names[i]} in [{begin[i]:.5g}, {end[i]:.5g}]" for i in active]
+            ranges = []
+            for i in active:
+                unit = of_storey_frame(names[i]).unit
+                lower, upper = (engineering(x, unit, digits=5) for x in (begin[i], end[i]))
+                ranges.append(f"{names[i]} from {lower} to {upper}")
             texts.append(" and ".join(ranges))
         within = "within " if len(self.open) > SHOWN_RANGES else ""
         return within + "; ".join(texts)
@@ -512,6 +518,9 @@ def _what_is_known(flow: UnitFlow, search: _Search) -> str:
     if not np.isfinite(search.finite_peaks).all():
         return f"{what}; open is {ranges}"
     peaks = np.maximum.reduce([search.finite_peaks, *[x.peaks for x in found]]).max(axis=1)
-    texts = [f"{name} ≤ {peak:.5g}" for name, peak in zip(flow.flow.outputs, peaks, strict=True)]
-    of_box = f"over {100 * bounded:.3g} % of the box {', '.join(texts)} in SI units"
+    texts = [
+        f"{name} ≤ {engineering(peak, unit, digits=5)}"
+        for name, unit, peak in zip(flow.flow.outputs, flow.units, peaks, strict=True)
+    ]
+    of_box = f"over {100 * bounded:.3g} % of the box {', '.join(texts)}"
     return f"{what}; guaranteed {of_box}; open is {ranges}"

@@ -113,3 +113,18 @@ def test_a_decision_says_where_a_bound_was_sought_no_closer_than_its_limit(rng):
         assert decision.limits["q1"].verdict == verdict
         assert found["q1"].proved[0] >= reached.max()
         assert "not sought closer" in str(decision.table())
+
+
+def test_a_message_names_open_ranges_and_bounds_in_their_units():
+    frame = StoreyFrame(
+        masses=[4e5], stiffness=[1.2e7], yield_force=[2e5], hardening=[0.1], v0=[2.0],
+        outputs=("q1",), damping_ratio=0.02,
+    )  # fmt: skip
+    inputs = {"k1": Interval(0.6e7, 2.4e7), "fy1": Interval(1e5, 4e5)}
+    with pytest.raises(UnprovedError) as refused:
+        envelope(
+            frame, inputs, "proof", boxes=1, alpha=[0], duration=4.0, step=0.05, progress=False
+        )
+    assert "k1 from 6.0000 MN/m to 24.000 MN/m and fy1 from 100.00 kN to 400.00" in str(
+        refused.value
+    )
