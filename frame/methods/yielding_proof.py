@@ -14,6 +14,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import FailedError
+from alphacut.base.nature import rounded
 from alphacut.base.number_text import engineering
 from alphacut.base.progress_bar import Progress
 from alphacut.frame.bounds.interpolated_box import InterpolatedFrame
@@ -518,9 +519,10 @@ def _what_is_known(flow: UnitFlow, search: _Search) -> str:
     if not np.isfinite(search.finite_peaks).all():
         return f"{what}; open is {ranges}"
     peaks = np.maximum.reduce([search.finite_peaks, *[x.peaks for x in found]]).max(axis=1)
+    upwards = [rounded(peak, "upper", Nature.GUARANTEED, 5) for peak in peaks]
     texts = [
         f"{name} ≤ {engineering(peak, unit, digits=5)}"
-        for name, unit, peak in zip(flow.flow.outputs, flow.units, peaks, strict=True)
+        for name, unit, peak in zip(flow.flow.outputs, flow.units, upwards, strict=True)
     ]
     of_box = f"over {100 * bounded:.3g} % of the box {', '.join(texts)}"
     return f"{what}; guaranteed {of_box}; open is {ranges}"

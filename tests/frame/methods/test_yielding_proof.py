@@ -1,6 +1,7 @@
 """Proof of one yielding storey: guaranteed peaks, and what is refused with the input to change."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from alphacut.frame.analyses.peaks import close_peaks
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.yielding import YieldingFlow
-from alphacut.frame.methods.yielding_proof import prove_yielding
+from alphacut.frame.methods.yielding_proof import _what_is_known, prove_yielding
 from alphacut.frame.threshold import Threshold
 from alphacut.fuzzy import Interval, Nature, Triangular
 from tests.frame.bounds.test_interpolated_box import isolated_building
@@ -128,3 +129,17 @@ def test_a_message_names_open_ranges_and_bounds_in_their_units():
     assert "k1 from 6.0000 MN/m to 24.000 MN/m and fy1 from 100.00 kN to 400.00" in str(
         refused.value
     )
+
+
+def test_what_a_message_guarantees_is_rounded_up():
+    flow = SimpleNamespace(
+        flow=SimpleNamespace(outputs=("q1",)), boxes=SimpleNamespace(names=("k1",)), units=("m",)
+    )
+    search = SimpleNamespace(
+        open=[],
+        count=3,
+        open_ranges=lambda names: "nothing",
+        closed_fraction=0.5,
+        finite_peaks=np.array([[0.0, 1.000001]]),
+    )
+    assert "q1 ≤ 1.0001 m" in _what_is_known(flow, search)
