@@ -44,7 +44,7 @@ def figure_style() -> Iterator[None]:
 
 
 def panels(
-    height: float, rows: int = 1, columns: int = 1, **shared: Any
+    height: float, rows: int = 1, columns: int = 1, *, sharex: bool = False, sharey: bool = False
 ) -> tuple[Figure, list[Axes]]:
     """Return a new figure of usual width, and its panels row by row.
 
@@ -52,16 +52,21 @@ def panels(
         height: Height of the figure in inches.
         rows: Number of rows.
         columns: Number of panels in a row.
-        shared: `sharex` or `sharey`, as Matplotlib takes them.
+        sharex: Whether all panels have one range of x.
+        sharey: Whether all panels have one range of y.
     """
     size = (WIDTH, height)
-    figure, grid = plt.subplots(rows, columns, squeeze=False, figsize=size, **shared)
+    figure, grid = plt.subplots(
+        rows, columns, squeeze=False, figsize=size, sharex=sharex, sharey=sharey
+    )
     return figure, list(grid.flat)
 
 
-def legend_beside(axes: Axes, **options: Any) -> None:
-    """Add a legend on the right of the axes, with further options of Matplotlib."""
-    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), **options)
+def legend_beside(
+    axes: Axes, handles: Sequence[Artist] | None = None, title: str | None = None
+) -> None:
+    """Add a legend on the right of the axes, of all that has a label or of some handles."""
+    axes.legend(handles=handles, title=title, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 def rows_of(axes: Axes, names: Iterable[str]) -> Array:
