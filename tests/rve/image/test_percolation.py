@@ -10,10 +10,12 @@ from alphacut.rve import GreyImage, fuzzy_image_conductivity, solve_conduction, 
 from alphacut.rve.image import memory
 from alphacut.rve.image.fields import equilibrium
 from alphacut.rve.image.fields import fluxes as of_fluxes
+from alphacut.rve.image.fields.element import element_of
 from alphacut.rve.image.fields.equilibrium import solve_stresses
 from alphacut.rve.image.fields.fluxes import solve_fluxes
 from alphacut.rve.image.fields.forest import Forest, Percolation, sweep_fluxes
 from alphacut.rve.image.fields.nodes import NodeCopies
+from alphacut.rve.image.fields.split import SplitGrid
 from alphacut.rve.image.phases import ModuliImages
 from tests.refused import refuses
 from tests.rve.image.test_bounds import TIGHT
@@ -308,6 +310,10 @@ def test_nodes_are_split_beside_void_and_not_beside_a_soft_phase(rng):
     whole = NodeCopies.of_mask(np.ones_like(solid))
     assert len(split.places) == 2 * solid.size
     assert np.array_equal(whole.places, np.arange(solid.size))
+    element = element_of((1.0, 1.0), dual=False, conduction=True)
+    for soft, copies in ((0.0, solid.size), (1e-9, 0)):
+        board = np.where(solid, 1.0, soft)
+        assert len(SplitGrid.of_coefficients(element, [board]).places) == copies
     images = ModuliImages(np.where(solid, 1.0, 0.0)[None], np.where(solid, 1.0, 1e-9)[None])
     assert not images.moduli_of_fields(dual=True)[0][~solid].any()
     assert images.moduli_of_fields(dual=False)[0][~solid].all()
