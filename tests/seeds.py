@@ -4,9 +4,10 @@
     ./enter python -m tests.seeds 200 tests/frame/spectra        # those of one folder
     ./enter python -m tests.seeds 200 --seconds 60 --not-slow    # no more than a minute each
 
-Each file of tests has one process, in which its tests run again with one seed after the other. A
-line for each test says how many seeds it got, and which ones failed; SEED=… repeats one of these.
-This module is also the plugin of pytest that does so within a process.
+Each file of tests has one process, in which its tests run again with one seed after the other; as
+many run at once as there are cores. A line for each test says how many seeds it got, and which ones
+failed; SEED=… repeats one of these. This module is also the plugin of pytest that does so within a
+process.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import secrets
 import subprocess
 import sys
 from collections import defaultdict
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -121,13 +123,19 @@ def main() -> int:
     files = set()
     for place in options.places:
         files.update([place] if place.is_file() else place.rglob("test_*.py"))
+    drawing = [file for file in sorted(files) if "rng" in file.read_text(encoding="utf-8")]
+
+    def run(file: Path) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [*words, str(file)], cwd=ROOT, env=environment, check=False, capture_output=True,
+            text=True,
+        )  # fmt: skip
+
     status = 0
-    for file in sorted(files):
-        if "rng" in file.read_text(encoding="utf-8"):
-            code = subprocess.run(
-                [*words, str(file)], cwd=ROOT, env=environment, check=False
-            ).returncode
-            if code not in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        for done in pool.map(run, drawing):
+            print(done.stdout + done.stderr, end="", flush=True)
+            if done.returncode not in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
                 status = 1
     return status
 
