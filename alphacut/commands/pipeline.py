@@ -373,7 +373,7 @@ class Pipeline:
         limits = self.content.limits_where_yielding(structure)
         task = replace(task, limited=limited, limits=limits)
         longest_first = sorted(records, key=lambda record: -record.duration)
-        stages = [suite.stage(structure, task, record) for record in longest_first]
+        stages = suite.stages(structure, task, longest_first)
         outcomes = self.store.take_all(stages, self.executor)
         by_record = {record.name: outcomes[f"record_{record.name}"].numbers for record in records}
         found = suite.suite_peaks(structure, task, records, by_record)

@@ -295,7 +295,7 @@ class EnvelopeTask:
         return close_peaks(
             structure.model,
             names=self.limited,
-            limits=self.limits,
+            thresholds=thresholds_of(structure.model, self.limits),
             progress=progress,
             **response,
         )

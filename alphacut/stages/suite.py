@@ -22,10 +22,12 @@ from alphacut.frame.analyses.suites import (
     record_peaks,
     scaled_records,
     summarised,
+    thresholds_under,
 )
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.quantities import output_of
+from alphacut.frame.threshold import Threshold
 from alphacut.fuzzy.result import Nature
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.store import Stage, StageContext, StageResult
@@ -144,26 +146,49 @@ def moved_by(structure: Structure, record: ScaledRecord) -> Structure:
     return replace(structure, model=linear_model(structure).moved_by(*record.components))
 
 
-def stage(structure: Structure, task: EnvelopeTask, record: ScaledRecord) -> Stage[dict[str, Peak]]:
-    """Return the stage that computes the peaks of a structure under one record.
+def stages(
+    structure: Structure, task: EnvelopeTask, records: Sequence[ScaledRecord]
+) -> list[Stage[dict[str, Peak]]]:
+    """Return the stages that compute the peaks of a structure, one for each record.
 
-    Its name is "record_NAME" with the name of the record.
+    Their names are "record_NAME" with the names of the records.
 
     Args:
         structure: The structure with its fuzzy parameters.
         task: Names of the fuzzy inputs and of the peaks, time step and α-levels.
-        record: The scaled record.
+        records: The scaled records.
+
+    Raises:
+        RefusedError: An input is unknown or crisp, or a trajectory does not exist.
     """
-    # `work` is the size of a stage compared with the others: the duration of the response.
-    inputs = [structure.model, structure.numbers, record, task]
-    compute = partial(_peaks, structure, task, record)
+    section = task.section
+    asked = thresholds_under(
+        linear_model(structure),
+        structure.inputs(task.fuzzy),
+        records,
+        task.limits,
+        step=section.step,
+        alpha=section.alpha,
+    )
     packages = ("fuzzy", "frame")
-    name = f"record_{record.name}"
-    return Stage(name, inputs, packages, dict[str, Peak], compute, work=record.duration)
+    found = []
+    for record in records:
+        thresholds = asked[record.name]
+        inputs = [structure.model, structure.numbers, record, task, thresholds]
+        compute = partial(_peaks, structure, task, record, thresholds)
+        name = f"record_{record.name}"
+        # `work` is the size of a stage compared with the others: the duration of the response.
+        stage = Stage(name, inputs, packages, dict[str, Peak], compute, work=record.duration)
+        found.append(stage)
+    return found
 
 
 def _peaks(
-    structure: Structure, task: EnvelopeTask, record: ScaledRecord, context: StageContext
+    structure: Structure,
+    task: EnvelopeTask,
+    record: ScaledRecord,
+    thresholds: Sequence[Threshold],
+    context: StageContext,
 ) -> StageResult[dict[str, Peak]]:
     """Compute the bounds of the peaks of a structure under one record, by name.
 
@@ -171,6 +196,7 @@ def _peaks(
         structure: A linear structure, or a frame that yields.
         task: Names of the fuzzy inputs and of the peaks, time step and α-levels.
         record: The scaled record, which replaces any other load.
+        thresholds: What is asked of the peaks under it.
         context: Its `tick` is called with the completed fraction of the work.
 
     Raises:
@@ -185,7 +211,7 @@ def _peaks(
         task.limited,
         step=task.section.step,
         alpha=task.section.alpha,
-        limits=task.limits,
+        thresholds=thresholds,
         progress=context.tick,
     )
     if task.section.method in ("proof", "dual"):

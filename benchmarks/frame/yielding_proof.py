@@ -39,6 +39,7 @@ from alphacut.frame import (
     peaks,
     read_record,
 )
+from alphacut.frame.analyses.limits import thresholds_of
 from alphacut.frame.analyses.peaks import close_peaks
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.yielding import YieldingFlow
@@ -154,8 +155,8 @@ def show_corners(ground: Accelerogram) -> None:
     moat = Limit("q1", 1.5 * float(reached.max()))
     start = time.process_time()
     peak = close_peaks(
-        frame, within(frame, flow.names, 0.15), ["q1"], limits=[moat], progress=False,
-        duration=15.0, step=STEP, alpha=[0.0],
+        frame, within(frame, flow.names, 0.15), ["q1"], thresholds=thresholds_of(frame, [moat]),
+        duration=15.0, step=STEP, alpha=[0.0], progress=False,
     )["q1"]  # fmt: skip
     seconds = time.process_time() - start
     bound = f"at most {peak.proved[0]:.4f} m, {peak.nature.name.lower()}"

@@ -276,17 +276,18 @@ def about_limit(limit: Limit, unit: str) -> LimitResult:
 
 
 def thresholds_of(model: StructureModel, limits: Sequence[Limit]) -> tuple[Threshold, ...]:
-    """Return limits as the question that a proof answers; none if it has to bound peaks closely.
+    """Return limits as the questions that a proof answers.
 
-    The latter is so of linear structures, and where a mean over records is limited.
+    There are none of linear structures, whose peaks are bounded closely in any case. So is a peak
+    whose mean over records is limited.
 
     Args:
         model: The structure.
         limits: Limits with one value each, in SI units.
     """
-    if not yields(model) or any(limit.mean for limit in limits):
+    if not yields(model):
         return ()
-    return tuple(Threshold(x.output, x.outwards, x.largest) for x in limits)
+    return tuple(Threshold(x.output, None if x.mean else x.outwards, x.largest) for x in limits)
 
 
 def require_fragile(model: StructureModel, limits: Sequence[Limit]) -> None:

@@ -16,7 +16,6 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.progress_bar import Progress
 from alphacut.frame.analyses.gap_causes import missing_guarantee, open_part, wide_gap
-from alphacut.frame.analyses.limits import Limit, thresholds_of
 from alphacut.frame.boxes import ALPHA
 from alphacut.frame.dynamics.yielding import AT_NODES
 from alphacut.frame.methods.auto import Auto
@@ -25,6 +24,7 @@ from alphacut.frame.propagation import envelope
 from alphacut.frame.result import Envelope, within_steps
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.quantities import output_of
+from alphacut.frame.threshold import Threshold
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Bounds, Ends, Nature
 
@@ -558,7 +558,7 @@ def close_peaks(
     alpha: Sequence[float] = ALPHA,
     error: float = PEAK_ERROR,
     dual_first: bool = False,
-    limits: Sequence[Limit] = (),
+    thresholds: Sequence[Threshold] = (),
     progress: Progress | bool | None = None,
 ) -> dict[str, Peak]:
     """Return fuzzy peaks of a structure, by the method that bounds them most closely.
@@ -577,8 +577,8 @@ def close_peaks(
         error: Error that is aimed at, and need not be reached, as a fraction of each peak.
         dual_first: Whether the dual bound is tried first: it is sooner done, and no better than
             the error.
-        limits: Limits of some of these peaks, with one value each. If columns yield, the effort
-            goes to the question whether they hold, and bounds are sought no closer.
+        thresholds: Limits of some of these peaks where columns yield, see `thresholds_of`. The
+            effort goes to the question whether they hold, and bounds are sought no closer.
         progress: Called with the completed fraction; None shows a bar on a terminal, False shows
             nothing.
 
@@ -598,7 +598,7 @@ def close_peaks(
             peaks=True,
             magnitudes=magnitudes,
             dual_first=dual_first,
-            thresholds=thresholds_of(model, limits),
+            thresholds=tuple(thresholds),
         ),
         duration=duration,
         step=step,

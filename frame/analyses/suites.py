@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from alphacut.base.arrays import Array
+from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import RefusedError, checked_number, require, require_choice
 from alphacut.base.number_text import (
     STANDARD_GRAVITY,
@@ -21,10 +21,11 @@ from alphacut.base.number_text import (
 from alphacut.base.progress_bar import Progress, nth_subprogress
 from alphacut.frame.analyses.angles import TURN, angle_peaks, angle_response
 from alphacut.frame.analyses.answer import Answer, Row
-from alphacut.frame.analyses.limits import Limit
+from alphacut.frame.analyses.limits import Limit, thresholds_of
 from alphacut.frame.analyses.peaks import Peak, Peaks, close_peaks, largest_peaks, with_combined
-from alphacut.frame.boxes import ALPHA, boxes
+from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
+from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.records.recording import arias_fractions
 from alphacut.frame.spectra.response_spectrum import rotated_spectra, spectral_acceleration
@@ -32,6 +33,7 @@ from alphacut.frame.structures.linear import LinearSystem, has_matrices, nominal
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.quantities import output_of
+from alphacut.frame.threshold import Threshold
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Nature
 
@@ -327,7 +329,7 @@ def record_peaks(
     *,
     step: float,
     alpha: Sequence[float],
-    limits: Sequence[Limit] = (),
+    thresholds: Sequence[Threshold] = (),
     progress: Progress | bool | None = None,
 ) -> dict[str, Peak]:
     """Return fuzzy peaks of a structure under a record, by name.
@@ -342,7 +344,7 @@ def record_peaks(
             "min q3" for its largest and smallest value.
         step: Step, in s.
         alpha: Levels, rising within [0, 1].
-        limits: See `close_peaks`.
+        thresholds: See `close_peaks`, and `thresholds_under` for those of several records.
         progress: Called with the completed fraction; None shows a bar on a terminal, False shows
             nothing.
 
@@ -354,7 +356,117 @@ def record_peaks(
     moved = model.moved_by(*record.components)
     if record.all_angles:
         return angle_peaks(moved, inputs, names, **motion, progress=progress).peak
-    return close_peaks(moved, inputs, names, **motion, limits=limits, progress=progress)
+    return close_peaks(moved, inputs, names, **motion, thresholds=thresholds, progress=progress)
+
+
+def thresholds_under(
+    model: LinearSystem,
+    inputs: Mapping[str, FuzzyNumber],
+    records: Sequence[ScaledRecord],
+    limits: Sequence[Limit],
+    *,
+    step: float,
+    alpha: Sequence[float],
+) -> dict[str, tuple[Threshold, ...]]:
+    """Return the questions about limits that are left to the proofs under each record, by its name.
+
+    Exact trajectories at midpoints and corners of all cuts under all records are taken first. If
+    one in a cut exceeds a limit under any record, and another keeps it under some record, then the
+    largest peak over the records can exceed the limit, and this record does not show that it must:
+    nothing is left to be asked of it up to this level.
+
+    A mean over the records keeps its limit if the mean of the bounds does. So each record is asked
+    whether its peak keeps a limit of its own, whose mean is the limit of the mean. These limits are
+    in proportion to the largest peaks that are known, or to the smallest where all known means
+    exceed the limit. A mean for which both is so neither way has its peaks bounded closely.
+
+    Args:
+        model: The structure; each record replaces its own one.
+        inputs: Fuzzy parameters by name, in SI units.
+        records: The scaled records, at least one.
+        limits: Limits with one value each, in SI units.
+        step: Step, in s.
+        alpha: Levels, rising within [0, 1].
+
+    Raises:
+        RefusedError: An input is unknown, or a trajectory does not exist.
+    """
+    from alphacut.frame.methods.yielding_proof import MAX_INPUTS, known_peaks
+
+    asked = thresholds_of(model, limits)
+    cuts = boxes(inputs, alpha)
+    if not asked or np.count_nonzero(cuts.upper[0] > cuts.lower[0]) > MAX_INPUTS:
+        return {record.name: asked for record in records}
+    outputs = tuple(dict.fromkeys(threshold.output for threshold in asked))
+    tried, is_in_cut = _tried(cuts)
+    known = []
+    for record in records:
+        moved = model.moved_by(*record.components).with_outputs(outputs)
+        flow = make_flow(moved, cuts.names, record.duration, step / NODES, "exact")
+        assert isinstance(flow, YieldingFlow)  # as there are thresholds
+        values, peaks = flow.values_and_peaks(tried)
+        columns = [outputs.index(threshold.output) for threshold in asked]
+        of_record = zip(asked, np.moveaxis(values, -1, 0)[columns], peaks.T[columns], strict=True)
+        known.append([known_peaks(*of_threshold) for of_threshold in of_record])
+    questions = [
+        _questions(threshold, limit.number, found, is_in_cut, cuts.alpha)
+        for threshold, limit, found in zip(asked, limits, np.swapaxes(known, 0, 1), strict=True)
+    ]
+    by_record = zip(*questions, strict=True)
+    return {record.name: x for record, x in zip(records, by_record, strict=True)}
+
+
+def _tried(cuts: Boxes) -> tuple[Array, Mask]:
+    """Return structures of the cuts, the nominal one, midpoints and corners; and who is in a cut.
+
+    Returns:
+        Parameter sets in SI units, shape (structures, parameters), and whether each is in the cut
+        of each level, shape (levels, structures).
+    """
+    points = [cuts.nominal]
+    for lower, upper in zip(cuts.lower, cuts.upper, strict=True):
+        # At most 64 corners of each cut (tuned: more take time, and none is a bound).
+        ends_of_inputs = np.column_stack([lower, upper])
+        points += [(lower + upper) / 2, *map(np.array, islice(product(*ends_of_inputs), 64))]
+    # Cuts share corners, for example those of crisp inputs.
+    tried = np.unique(points, axis=0)
+    is_inside = (tried >= cuts.lower[:, np.newaxis]) & (tried <= cuts.upper[:, np.newaxis])
+    return tried, is_inside.all(axis=-1)
+
+
+def _questions(
+    threshold: Threshold, limit: float, known: Array, is_in_cut: Mask, alpha: Array
+) -> list[Threshold]:
+    """Return what is left to be asked about a threshold under each of R records.
+
+    Args:
+        threshold: The threshold; without a value the mean over the records is limited.
+        limit: Its limit, in SI units.
+        known: Bounds of the peaks of known trajectories, the least and the most that they can be,
+            shape (R, 2, structures).
+        is_in_cut: Whether each structure is in the cut of each level, shape (levels, structures).
+        alpha: Levels, rising, shape (levels,).
+    """
+    is_mean = threshold.value is None
+    value = limit if threshold.value is None else threshold.value
+    compared = known.mean(axis=0, keepdims=True) if is_mean else known
+    is_exceeded = (is_in_cut & (compared[:, 0] > value).any(axis=0)).any(axis=1)
+    is_kept = (is_in_cut & (compared[:, 1, np.newaxis] <= value)).any(axis=2)
+    answered = np.where(is_exceeded & is_kept, alpha, -1.0).max(axis=1)
+    values: list[float | None] = [threshold.value] * len(known)
+    is_left = alpha > answered[0]
+    if is_mean and is_left.any():
+        of_cut = known[:, :, is_in_cut[is_left.argmax()]]
+        most = of_cut[:, 0].max(axis=1)
+        least = of_cut[:, 1].min(axis=1)
+        if most.mean() <= limit:
+            values = (most * limit / max(most.mean(), 1e-300)).tolist()
+        elif least.mean() > limit:
+            values = (least * limit / least.mean()).tolist()
+    levels = np.broadcast_to(answered, len(known))
+    return [
+        replace(threshold, value=x, answered=float(a)) for x, a in zip(values, levels, strict=True)
+    ]
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -611,24 +723,15 @@ def mean_peaks(
     The mean of each structure lies between the mean of the smallest and the mean of the largest
     peaks of the cut. No structure may attain the latter, since each record has its own worst
     structure. The attained value is the largest mean of the structures that are tried here: the
-    nominal one and corners of the cuts. Their peaks are read at the time nodes, so that the true
-    mean of such a structure is no smaller.
+    nominal one, midpoints and corners of the cuts. Their peaks are read at the time nodes, so that
+    the true mean of such a structure is no smaller.
 
     The peaks under each record are given by the record's name and by the peak's name; only those of
     magnitudes have means. The other arguments are those of `over_records`.
     """
     magnitudes = tuple(name for name in peaks[records[0].name] if name == output_of(name))
     cuts = boxes(inputs, alpha)
-    points = [cuts.nominal]
-    for lower, upper in zip(cuts.lower, cuts.upper, strict=True):
-        # At most 64 corners of each cut (tuned: more take time, and none is a bound).
-        ends_of_inputs = np.column_stack([lower, upper])
-        points += map(np.array, islice(product(*ends_of_inputs), 64))
-    # Cuts share corners, for example those of crisp inputs.
-    tried = np.unique(points, axis=0)
-    is_inside = (tried >= cuts.lower[:, np.newaxis]) & (tried <= cuts.upper[:, np.newaxis])
-    is_in_cut = is_inside.all(axis=-1)  # (levels, structures)
-
+    tried, is_in_cut = _tried(cuts)
     tried_means: Array = np.zeros((len(tried), len(magnitudes)))
     for record in records:
         moved = model.moved_by(*record.components).with_outputs(magnitudes)

@@ -76,6 +76,21 @@ class LoadIntegrals(NamedTuple):
     powers: Array  # (E, L, 4)
 
 
+class Search(NamedTuple):
+    """How far J motions have been searched for events, and how they move over a quiet interval.
+
+    Over an interval of the length `step` without an event the state at its end, and before it the
+    slider's elastic force, or the rate of the drift of a yielding storey, at its quarters, are
+    linear in the state at its beginning, the powers of the loads, and a constant: c of an elastic
+    storey, the direction of yielding else.
+    """
+
+    time: Array  # up to which there is no event that is not left out, (J,), in s
+    state: Array  # X and P there, (J, 2N)
+    step: float  # in s
+    rows: Array  # of an elastic and of a yielding storey, (J, 2, 4 + 2N, 2N + 4 L + 1)
+
+
 class Elements(NamedTuple):
     """Motions at J parameter sets on at most E elements, with the fraction τ that has passed."""
 
@@ -211,21 +226,85 @@ def _excess(powers: Array, tau: float, side: int, limit: float) -> float:
 
 
 @compiled
+def _fill_rows(frames: Frames, step: float, rows: Array) -> None:
+    """Write how motions move over a quiet interval to `rows`; see `Search`."""
+    n, n_sets = frames.inverse_mass.shape
+    series = np.empty((MAX_TERMS, 2 * n))
+    unit = np.zeros(rows.shape[-1])
+    for j in range(n_sets):
+        for phase in range(2):
+            # The column of the constant is the last one, and comes first: the force of a yielding
+            # storey is a part of all others.
+            for column in range(len(unit) - 1, -1, -1):
+                unit[:] = 0.0
+                unit[column] = 1.0
+                load = unit[2 * n : -1].copy().reshape(4, -1)
+                count = _expand(frames, j, phase, unit[-1], load, step, unit[: 2 * n], series)
+                powers = _drifts(frames, series[:count], load)
+                if phase == 0:
+                    powers *= frames.slider[j]
+                    powers[0] -= unit[-1]
+                else:
+                    powers = np.arange(1, count) * powers[1:] / step
+                found = rows[j, phase, :, column]
+                for m in range(4):
+                    found[m] = _excess(powers, (m + 1) / 4, 1, 0.0)
+                found[4:] = series.sum(axis=0)
+                if phase != 0 and unit[-1] == 0.0:
+                    found -= rows[j, phase, :, -1]
+
+
+@compiled
+def _passes_quietly(
+    loads: LoadIntegrals, search: Search, j: int, phase: int, constant: float, interval: int,
+    limit: float,
+) -> bool:  # fmt: skip
+    """Return whether a motion has no event in an interval, and then move it to its end, in place.
+
+    Args:
+        loads: The loads.
+        search: Where the motion is, at the beginning of the interval.
+        j: Number of the motion.
+        phase: Direction of yielding, or 0.
+        constant: c of an elastic storey.
+        interval: The interval.
+        limit: Force, or velocity against the direction of yielding, that is not passed at quarters
+            of the interval if there is no event.
+    """
+    step = search.step
+    rows = search.rows[j, abs(phase)]
+    given = np.empty(rows.shape[1])
+    states = len(rows) - 4
+    given[:states] = search.state[j]
+    given[states:-1] = _cubic(loads, interval, loads.edges[interval], step).ravel()
+    given[-1] = phase if phase else constant
+    for m in range(len(rows)):
+        value = 0.0
+        for column in range(len(given)):
+            value += rows[m, column] * given[column]
+        if m >= 4:
+            search.state[j, m - 4] = value
+        elif (-phase * value if phase else abs(value)) > limit:
+            return False
+    search.time[j] = loads.edges[interval + 1]
+    return True
+
+
+@compiled
 def _next_event(
-    frames: Frames, loads: LoadIntegrals, j: int, phase: int, constant: float, t: float,
-    after: float, state: Array, longest: float, until: float, room: Array, spent: float,
+    frames: Frames, loads: LoadIntegrals, search: Search, j: int, phase: int, constant: float,
+    after: float, longest: float, until: float, room: Array, spent: float,
 ) -> tuple[float, int, float, float]:  # fmt: skip
-    """Return the next event of one motion, behind the time `after`.
+    """Return the next event of one motion, behind the time `after`, and move `search` up to it.
 
     Args:
         frames: The frames.
         loads: The loads.
+        search: Where the motions are, not behind `after`.
         j: Number of the parameter set.
         phase: Direction of yielding, or 0.
         constant: c of an elastic storey.
-        t: Time of the state.
         after: Time behind which events count.
-        state: X and P at t, shape (2N,).
         longest: Largest length of an element.
         until: Time at which the search ends.
         room: How far the slider may be moved at most from each interval on, in m, shape (E,).
@@ -235,7 +314,7 @@ def _next_event(
         Its time, `NEVER` if there is none; its side; the time at which the excess ends by itself or
         the search does, `NEVER` if it exceeds the room; and by how much the slider would be moved.
     """
-    series = np.empty((MAX_TERMS, len(state)))
+    series = np.empty((MAX_TERMS, search.state.shape[1]))
     place = frames.place
     slider = frames.slider[j]
     inverse_mass = frames.inverse_mass[place, j]
@@ -257,12 +336,17 @@ def _next_event(
     side = 0
     size = moved = pushed = 0.0
     passes = False
-    y = state.copy()
-    while t < until:
+    while search.time[j] < until:
+        t = search.time[j]
         i = _interval(loads, t)
         h = min(loads.edges[i + 1] - t, longest)
+        is_whole = t > after and abs(h - search.step) < 1e-9 * h
+        if is_whole and not passes and _passes_quietly(
+            loads, search, j, phase, constant, i, limit + tolerance
+        ):  # fmt: skip
+            continue
         load = _cubic(loads, i, t, h)
-        terms = _expand(frames, j, phase, constant, load, h, y, series)
+        terms = _expand(frames, j, phase, constant, load, h, search.state[j], series)
         powers = _drifts(frames, series[:terms], load)
         if phase == 0:
             powers *= slider
@@ -298,8 +382,8 @@ def _next_event(
                     if COST * size + spent > room[i]:
                         return first, side, NEVER, size
             before = tau
-        y = series.sum(axis=0)
-        t += h
+        search.state[j] = series.sum(axis=0)
+        search.time[j] = t + h
     # What passes at the end of the search, and stays within the room, counts as ended there.
     return first, side, until if passes else NEVER, size
 
@@ -413,6 +497,13 @@ def march(
     spent = 0.0
     is_fixed = True
     is_fresh = True  # whether the next event is not known
+    search = Search(
+        time=t.copy(),
+        state=start.copy(),
+        step=min(float(np.median(np.diff(loads.edges[: last + 1]))), longest),
+        rows=np.empty((n_sets, 2, 4 + 2 * n, 2 * n + 4 * len(frames.follow) + 1)),
+    )
+    _fill_rows(frames, search.step, search.rows)
     while not (is_fixed and edge >= last):
         chosen = np.ones(n_sets, np.bool_)
         while is_fresh:
@@ -420,8 +511,8 @@ def march(
                 if chosen[j]:
                     after = end_time[j] if end_time[j] > 0 else t[j]
                     event_time[j], side[j], end_time[j], size[j] = _next_event(
-                        frames, loads, j, phase, constant[j], t[j], after + 1e-9, state[j],
-                        longest, search_until, room, spent,
+                        frames, loads, search, j, phase, constant[j], after + 1e-9, longest,
+                        search_until, room, spent,
                     )  # fmt: skip
             f = event_time.argmin()
             if event_time[f] >= loads.edges[last]:  # none that counts before the end
@@ -499,4 +590,6 @@ def march(
         phase = int(side[0]) if phase == 0 else 0
         is_fresh = True
         end_time[:] = 0.0
+        search.time[:] = t
+        search.state[:] = state
     return element

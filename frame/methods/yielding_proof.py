@@ -81,7 +81,7 @@ def prove_yielding(
     influence = _influence(yielding_flow, boxes)
     levels: list[_Search] = []
     for row, tick in boxes.inside_out(progress):
-        search = _Search(frame, influence, boxes.lower[row], boxes.upper[row], gap, thresholds)
+        search = _Search(frame, influence, boxes, row, gap, thresholds)
         if levels:  # a wider box contains what the narrower one attains
             search.take_over(levels[-1])
         search.run(budget, tick)
@@ -173,28 +173,30 @@ class _Search:
         self,
         frame: InterpolatedFrame,
         influence: Array,
-        low: Array,
-        high: Array,
+        boxes: Boxes,
+        row: int,
         gap: Array,
         thresholds: Sequence[Threshold],
     ) -> None:
-        """Begin with the trajectories at corners and centre of the box of a level.
+        """Begin with the nominal trajectory and those at corners and centre of the box of a level.
 
         Args:
             frame: The frame.
             influence: By how much each input moves the response, shape (d,).
-            low: Lower ends of the box, in SI units, shape (d,).
-            high: Upper ends.
+            boxes: The boxes of all levels.
+            row: Which level.
             gap: Wanted gap of the peak of each output, in its unit, shape (m,).
             thresholds: Limits of peaks, if they are what is asked.
         """
         self.gap = np.maximum(gap, 1e-300)
         self.frame = frame
         self.influence = influence
-        self.low = low
-        self.high = high
+        self.low = low = boxes.lower[row]
+        self.high = high = boxes.upper[row]
         self.width = np.where(high > low, high - low, 1.0)
         outputs = list(map(str, frame.flow.outputs))
+        self.alpha = float(boxes.alpha[row])
+        self.is_to_limits = bool(thresholds)
         self.thresholds = [(outputs.index(x.output), x) for x in thresholds]
         m = len(outputs)
         d = len(low)
@@ -214,7 +216,7 @@ class _Search:
         self.trajectories = 0
         self.open: list[_SubBox] = []
         self.finite_peaks = np.full((m, 2), -np.inf)
-        self._attain(_probes(low, high))
+        self.attain(np.vstack([boxes.nominal, _probes(low, high)]))
 
     def take_over(self, narrower: _Search) -> None:
         """Take over, in place, what trajectories of a narrower level attain."""
@@ -270,8 +272,9 @@ class _Search:
         """Return whether a sub-box says all that is asked.
 
         A threshold is answered by a sub-box whose bounds keep it or exceed it everywhere, and on
-        the whole level by two trajectories, one that keeps and one that exceeds it. Without
-        thresholds the peaks must be within the wanted gap of the attained ones.
+        the whole level by two trajectories, one that keeps and one that exceeds it. Finite bounds
+        suffice where all thresholds are answered. Without thresholds the peaks must be within the
+        wanted gap of the attained ones.
         """
         return self._score(box) <= 1
 
@@ -283,7 +286,7 @@ class _Search:
         """
         for box in self.open:
             self._close(box)
-        self._attain(boxes.to_physical(independent_points(boxes, level)))
+        self.attain(boxes.to_physical(independent_points(boxes, level)))
         excess = self.attained - self.upper[0]
         peaks = np.maximum(self.peaks.max(axis=1), 0.0)
         if (excess > 0).any() or (self.peak > peaks).any():
@@ -326,16 +329,22 @@ class _Search:
         Before the time of a peak it is a fraction of the wanted gap, or of the distance to the
         threshold; behind it a fraction of the distance of what follows below the peak.
         """
+        left = self._left()
+        if self.is_to_limits and not left:
+            return None
         history = self.frame.bounds(*_centre(self.low, self.high)).history
         if history is None:
             return None
         later = np.maximum.accumulate(history.peaks[::-1], axis=0)[::-1]
         allowed = np.maximum(ROOM * self.gap, ROOM * ROOM_BEFORE * (later[0] - later))
-        if self.thresholds:
+        if self.is_to_limits:
+            to_gap = allowed
             allowed = np.full_like(later, np.inf)
-            for column, threshold in self.thresholds:
-                beyond = np.abs(threshold.value - later[:, column])
-                allowed[:, column] = np.minimum(allowed[:, column], ROOM * beyond)
+            for column, threshold in left:
+                of_column = to_gap[:, column]
+                if threshold.value is not None:
+                    of_column = ROOM * np.abs(threshold.value - later[:, column])
+                allowed[:, column] = np.minimum(allowed[:, column], of_column)
         # Outputs that stay at rest, on which S has no influence, do not count.
         by_norm = np.where(history.by_norm > 0, history.by_norm, 1e-300)
         room = (allowed / by_norm).min(axis=1)
@@ -359,7 +368,7 @@ class _Search:
     def _add(self, heap: list[tuple[float, int, _SubBox]], box: _SubBox) -> None:
         """Close a sub-box if its bounds suffice, and else add it to the heap."""
         if not self.is_closed(box):
-            self._attain(_probes(box.low, box.high))
+            self.attain(_probes(box.low, box.high))
         if self.is_closed(box):
             self._close(box)
         else:
@@ -369,18 +378,30 @@ class _Search:
         """Return how far a sub-box is from an answer: above 1 where it is open."""
         if not np.isfinite(box.peaks).all():
             return np.inf
-        if not self.thresholds:
-            gaps = (box.peaks.max(axis=1) - self.peak) / self.gap
+        gaps = (box.peaks.max(axis=1) - self.peak) / self.gap
+        if not self.is_to_limits:
             return float(gaps.max(initial=0.0))
         score = 0.0
-        for (column, threshold), (least, most) in zip(self.thresholds, self.seen, strict=True):
+        for column, threshold in self._left():
             limit = threshold.value
-            is_answered = least <= limit < most
+            if limit is None:
+                score = max(score, float(gaps[column]))
+                continue
             keeps = threshold.peak(box.peaks[column]) <= limit
             exceeds = threshold.peak(box.least[column]) > limit
-            if not (is_answered or keeps or exceeds):
+            if not (keeps or exceeds):
                 score = max(score, 1 + float(threshold.peak(box.peaks[column]) - limit))
         return score
+
+    def _left(self) -> list[tuple[int, Threshold]]:
+        """Return the thresholds, with their outputs, that no two trajectories answer."""
+        left = []
+        for (column, threshold), (least, most) in zip(self.thresholds, self.seen, strict=True):
+            limit = threshold.value
+            is_seen = limit is not None and least <= limit < most
+            if not is_seen and threshold.answered < self.alpha:
+                left.append((column, threshold))
+        return left
 
     def _close(self, box: _SubBox) -> None:
         """Add the bounds of a sub-box to those of the level."""
@@ -392,7 +413,7 @@ class _Search:
         least = np.maximum(-box.upper[0], 0.0).max(axis=(0, 2))
         self.min_peak = np.minimum(self.min_peak, least)
 
-    def _attain(self, points: Array) -> None:
+    def attain(self, points: Array) -> None:
         """Raise attained values by the trajectories at points in SI units, shape (points, d)."""
         values, peaks = self.frame.flow.values_and_peaks(points)
         self.trajectories += len(points)
@@ -414,15 +435,26 @@ class _Search:
             kept[is_better] = found[is_better]
             kept_at[is_better] = points[chosen[is_better]]
         for (column, threshold), seen in zip(self.thresholds, self.seen, strict=True):
-            reached = peaks[:, column] * (1 - MAX_IMBALANCE)
-            kept_at_most = peaks[:, column] * (1 + MAX_IMBALANCE)
-            if threshold.side is not None:
-                # At nodes alone; what lies between may be larger, so that nothing is known to keep
-                # the limit.
-                reached = signed[:, :, column, int(threshold.side)].max(axis=1)
-                kept_at_most = np.full(len(points), np.inf)
-            seen[0] = min(seen[0], kept_at_most.min())
-            seen[1] = max(seen[1], reached.max())
+            least, most = known_peaks(threshold, values[:, :, column], peaks[:, column])
+            seen[0] = min(seen[0], most.min())
+            seen[1] = max(seen[1], least.max())
+
+
+def known_peaks(threshold: Threshold, values: Array, peaks: Array) -> Array:
+    """Return the least and the most that a threshold's peaks of trajectories can be, shape (2, S).
+
+    Args:
+        threshold: The threshold.
+        values: Its output at time nodes, shape (S, T).
+        peaks: Largest magnitudes over time, shape (S,).
+    """
+    # A trajectory is exact but for rounding, which the balance of its energy bounds.
+    if threshold.side is None:
+        return peaks * np.array([[1 - MAX_IMBALANCE], [1 + MAX_IMBALANCE]])
+    # Between the nodes of a side there may be more, so that nothing is known to keep the limit.
+    outwards = values if threshold.side else -values
+    least = outwards.max(axis=1) - MAX_IMBALANCE * np.abs(values).max(axis=1)
+    return np.stack([least, np.full(len(peaks), np.inf)])
 
 
 def _centre(low: Array, high: Array) -> tuple[Array, Array]:
@@ -478,13 +510,13 @@ def _envelope(flow: UnitFlow, name: str, levels: list[_Search], influence: Array
     )
     counts = sum(x.count for x in levels)
     notes = [f"{counts} sub-boxes prove peaks within {gap:.2g} of attained ones"]
-    if levels[0].thresholds:
+    if levels[0].is_to_limits:
         notes = [f"{counts} sub-boxes; peaks are not sought closer than their limits ask"]
     closed = levels[0].closed_fraction
     if levels[0].open:
         ranges = levels[0].open_ranges(flow.boxes.names)
         notes.append(f"{100 * closed:.3g} % of the box is closed; open is {ranges}")
-    if gap > YIELDING_GAP and not levels[0].thresholds:
+    if gap > YIELDING_GAP and not levels[0].is_to_limits:
         notes.append(f"narrow {strongest} first, which moves the response most")
     return flow.envelope(
         upper,
@@ -501,7 +533,7 @@ def _envelope(flow: UnitFlow, name: str, levels: list[_Search], influence: Array
             "gap_of_peaks": gap,
             "boxes": float(counts),
             "closed_fraction": closed,
-            "sought_to_limits": float(bool(levels[0].thresholds)),
+            "sought_to_limits": float(levels[0].is_to_limits),
             "motions_tested": sum(x.trajectories for x in levels),
         },
         notes=tuple(notes),

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Limit, StoreyFrame, decide, envelope, peaks
+from alphacut.frame.analyses.limits import thresholds_of
 from alphacut.frame.analyses.peaks import close_peaks
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -109,7 +110,8 @@ def test_a_decision_says_where_a_bound_was_sought_no_closer_than_its_limit(rng):
         (0.7 * reached.min(), "exceeded"),
     ):
         limit = Limit("q1", float(value))
-        found = close_peaks(frame, inputs, ["q1"], limits=[limit], progress=False, **motion)
+        asked = thresholds_of(frame, [limit])
+        found = close_peaks(frame, inputs, ["q1"], thresholds=asked, progress=False, **motion)
         decision = decide(found, limit)
         assert decision.limits["q1"].verdict == verdict
         assert found["q1"].proved[0] >= reached.max()
