@@ -33,7 +33,7 @@ Values = TypeVar("Values")
 PARTS = {0: 1, 1: 8, 2: 4, 3: 2}
 # Numbers of parts of an element's time on which the slider's force is bounded, in turn, until its
 # excess is below a fraction of the yield force, or does not become smaller by half (tuned).
-TIME_PARTS = (2, 8, 32, 128)
+TIME_PARTS = (1, 2, 8, 32, 128)
 SMALL_VIOLATION = 1e-9
 # The same of the velocity of a yielding storey.
 REVERSAL_PARTS = 32
@@ -386,21 +386,16 @@ def defects(found: Interpolant, small: float = 0.0) -> Defects:
 
     violation = np.zeros((len(growth), model.parts**model.inputs))
     beyond = np.zeros_like(violation)
-    # Mostly the sum of all magnitudes shows that the force of an elastic storey is small enough.
-    elastic = np.flatnonzero(found.phase == 0)
-    control = bernstein_matrix(found.terms - 1) @ found.elastic_force[elastic]
-    middle, radius = model.ranges(control)
-    most = (np.abs(middle) + radius).max(axis=1, initial=0.0) + level[elastic]
-    for e in elastic[most > low.force]:
-        passed = _elastic_violation(model, found.elastic_force[e], level[e], variation[e], small)
-        beyond[e] = passed.most
-        # |δ_j| adds up to what the slider falls back, and forces miss what it is beyond meanwhile.
-        forced = passed.integral * found.max_length[e]
-        violation[e] = passed.falls / np.sqrt(low.slider) + model.direction_norm * forced
-        path[e] += passed.rises.max() / low.slider
-    for e, back in _reversals(found):
-        violation[e] = np.sqrt(high.slider) * back
-        path[e] += back.max()
+    at = np.flatnonzero(found.phase == 0)
+    passed = _elastic_violations(model, found.elastic_force[at], level[at], variation[at], small)
+    beyond[at] = passed.most
+    # |δ_j| adds up to what the slider falls back, and forces miss what it is beyond meanwhile.
+    forced = passed.integral * found.max_length[at, np.newaxis]
+    violation[at] = passed.falls / np.sqrt(low.slider) + model.direction_norm * forced
+    path[at] += passed.rises.max(axis=1) / low.slider
+    at, back = _reversals(found)
+    violation[at] = np.sqrt(high.slider) * back
+    path[at] += back.max(axis=1)
     level = np.where(found.phase == 0, level, model.missed.force)
     return Defects(growth, violation, drift, path, beyond, level)
 
@@ -449,18 +444,18 @@ def _residuals(found: Interpolant) -> tuple[Array, Array]:
     return by_power @ weights, drift_defect[:, :, z] @ weights
 
 
-class _Violation(NamedTuple):
+class _Violations(NamedTuple):
     """What is left out where the slider of an elastic storey passes its yield force, in N."""
 
-    falls: Array  # what the force falls beyond the yield force, on each part of the box, (parts,)
-    rises: Array  # what it rises there, (parts,)
-    most: Array  # by how much it is beyond, (parts,)
-    integral: Array  # of that over τ, (parts,)
+    falls: Array  # what the force falls beyond the yield force, on parts of the box, (e, parts)
+    rises: Array  # what it rises there, (e, parts)
+    most: Array  # by how much it is beyond, (e, parts)
+    integral: Array  # of that over τ, (e, parts)
 
 
-def _elastic_violation(
-    model: BoxModel, force: Array, level: float, variation: float, small: float
-) -> _Violation:
+def _elastic_violations(
+    model: BoxModel, force: Array, level: Array, variation: Array, small: float
+) -> _Violations:
     """Bound what is left out where the slider of an elastic storey passes its yield force.
 
     The slider of the motion is held there. While the force rises beyond, it flows as it may; it is
@@ -470,71 +465,74 @@ def _elastic_violation(
 
     Args:
         model: The frame.
-        force: The slider's force by powers of τ, shape (K, F), in N.
-        level: Bound of what it misses, in N.
-        variation: Bound of the derivative by τ of what it misses, in N.
+        force: The slider's force by powers of τ, shape (e, K, F), in N.
+        level: Bounds of what it misses, shape (e,), in N.
+        variation: Bounds of the derivative by τ of what it misses, shape (e,), in N.
         small: See `defects`.
     """
-    best = _elastic_violation_on(model, force, level, variation, TIME_PARTS[0])
-    enough = np.maximum(SMALL_VIOLATION * model.low.force, small * np.sqrt(model.low.slider))
+    best = _elastic_violations_on(model, force, level, variation, TIME_PARTS[0])
+    enough = max(SMALL_VIOLATION * model.low.force, small * np.sqrt(model.low.slider))
+    rough = np.arange(len(force))
     for pieces in TIME_PARTS[1:]:
         # Control points on shorter parts of the time lie closer to the force.
-        before = best.falls.max()
-        if before > enough:
-            best = _elastic_violation_on(model, force, level, variation, pieces)
-            if before < 2 * best.falls.max():
-                break
+        before = best.falls[rough].max(axis=1, initial=0.0)
+        rough = rough[before > enough]
+        closer = _elastic_violations_on(model, force[rough], level[rough], variation[rough], pieces)
+        for kept, found in zip(best, closer, strict=True):
+            kept[rough] = found
+        if pieces > TIME_PARTS[1]:
+            rough = rough[before[before > enough] >= 2 * closer.falls.max(axis=1, initial=0.0)]
     return best
 
 
-def _elastic_violation_on(
-    model: BoxModel, force: Array, level: float, variation: float, pieces: int
-) -> _Violation:
-    """Return the results of `_elastic_violation` by control points on equal parts of the time."""
-    control = bernstein_matrix(len(force) - 1, pieces) @ force
+def _elastic_violations_on(
+    model: BoxModel, force: Array, level: Array, variation: Array, pieces: int
+) -> _Violations:
+    """Return the results of `_elastic_violations` by control points on equal parts of the time."""
+    control = bernstein_matrix(force.shape[1] - 1, pieces) @ force
+    of_box = coefficients(control, model.inputs, model.fine)
+    of_limit = coefficients(model.grid.force, model.inputs, model.fine)
     parts = model.parts**model.inputs
-    found = _Violation(*np.zeros((4, parts)))
+    found = _Violations(*np.zeros((4, len(force), parts)))
     for side in (-1.0, 1.0):
-        excess = side * control - model.grid.force
-        middle, radius = model.ranges(excess)
         # Control points that are surely below count as zero, and bound falls and rises of those
         # beside them. The last one of a part of the time is the first one of the next.
-        near = np.flatnonzero(middle + radius + level > 0)
+        middle = side * of_box[..., 0] - of_limit[0]
+        radius = np.abs(side * of_box[..., 1:] - of_limit[1:]).sum(axis=-1)
+        element, near = np.nonzero(middle + radius + level[:, np.newaxis] > 0)
         if not len(near):
             continue
-        above = np.zeros((len(excess), parts))
-        above[near] = np.maximum(model.part_maxima(excess[near], model.of_slider) + level, 0.0)
+        excess = side * control[element, near] - model.grid.force
+        most = model.part_maxima(excess, model.of_slider) + level[element, np.newaxis]
+        above = np.zeros((*control.shape[:2], parts))
+        above[element, near] = np.maximum(most, 0.0)
         # What the force misses rises and falls on those parts of the time alone.
-        is_beyond = above.reshape(pieces, -1, parts).max(axis=1) > 0
+        is_beyond = above.reshape(len(force), pieces, -1, parts).max(axis=2) > 0
         for total, step in ((found.falls, 1), (found.rises, -1)):
-            beside = np.clip(near + step, 0, len(excess) - 1)
-            change = model.part_maxima(excess[near] - excess[beside], model.of_slider)
-            total += np.minimum(above[near], np.maximum(change, 0.0)).sum(axis=0)
-            total += variation * is_beyond.mean(axis=0)
-        np.maximum(found.most, above.max(axis=0), out=found.most)
-        np.add(found.integral, above.mean(axis=0), out=found.integral)
+            beside = np.clip(near + step, 0, control.shape[1] - 1)
+            change = side * (control[element, near] - control[element, beside])
+            change = np.maximum(model.part_maxima(change, model.of_slider), 0.0)
+            np.add.at(total, element, np.minimum(above[element, near], change))
+            total += variation[:, np.newaxis] * is_beyond.mean(axis=1)
+        np.maximum(found.most, above.max(axis=1), out=found.most)
+        np.add(found.integral, above.mean(axis=1), out=found.integral)
     return found
 
 
-def _reversals(found: Interpolant) -> list[tuple[int, Array]]:
+def _reversals(found: Interpolant) -> tuple[Ints, Array]:
     """Bound how far a yielding storey moves against its direction of yielding.
 
     Returns:
-        Numbers of elements on which it may, each with the distance on each part of the box, in m.
+        Numbers of elements on which it may, and the distance on each part of the box, in m.
     """
     model = found.model
     at = np.flatnonzero(found.phase)
-    if not len(at):
-        return []
     order = np.arange(1, found.terms)[:, np.newaxis]
     # h times the velocity of the drift against the direction, at control points
     backward = -found.phase[at, np.newaxis, np.newaxis] * order * found.drift[at, 1:]
     middle, radius = model.ranges(bernstein_matrix(len(order) - 1) @ backward)
     variation = found.load_variation[at] @ model.following_drifts[:, model.place]
-    control_matrix = bernstein_matrix(len(order) - 1, REVERSAL_PARTS)
-    results: list[tuple[int, Array]] = []
-    for number in np.flatnonzero((middle + radius).max(axis=1) + variation > 0):
-        control = control_matrix @ backward[number]
-        above = model.part_maxima(control, model.degree) + variation[number]
-        results.append((int(at[number]), np.maximum(above, 0.0).mean(axis=0)))
-    return results
+    chosen = np.flatnonzero((middle + radius).max(axis=1, initial=-np.inf) + variation > 0)
+    control = bernstein_matrix(len(order) - 1, REVERSAL_PARTS) @ backward[chosen]
+    above = model.part_maxima(control, model.degree) + variation[chosen, np.newaxis, np.newaxis]
+    return at[chosen], np.maximum(above, 0.0).mean(axis=1)

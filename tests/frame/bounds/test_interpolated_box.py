@@ -8,7 +8,7 @@ from numpy.polynomial.chebyshev import chebvander
 
 from alphacut.frame import Accelerogram, StoreyFrame
 from alphacut.frame.bounds.interpolated_box import InterpolatedFrame, _start_error
-from alphacut.frame.bounds.interpolated_defects import _elastic_violation, defects, interpolate
+from alphacut.frame.bounds.interpolated_defects import _elastic_violations, defects, interpolate
 from alphacut.frame.calculus.interpolation import chebyshev_matrix, grid
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.yielding import YieldingFlow
@@ -240,7 +240,7 @@ def test_what_passes_the_yield_force_between_samples_is_counted(rng):
     shape = np.polynomial.polynomial.polyval(times, powers)
     size = float(rng.uniform(1e-6, 0.5)) * force / np.abs(shape).max()
     powers = size * powers + force * (np.arange(len(powers)) == 0)
-    found = _elastic_violation(model, powers[:, np.newaxis], 0.0, 0.0, 0.0)
+    found = _elastic_violations(model, powers[np.newaxis, :, np.newaxis], *np.zeros((2, 1)), 0.0)
     beyond = np.maximum(size * shape, 0)
     fall = np.maximum(-np.diff(beyond), 0).sum()
     assert fall * (1 - 1e-6) <= found.falls.max() <= 1.5 * fall
