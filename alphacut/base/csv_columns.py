@@ -15,7 +15,8 @@ from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError
 from alphacut.base.memory import require_text
 from alphacut.base.seen_folders import unseen
-from alphacut.base.stated import LENGTHS, METRES
+from alphacut.base.stated import LENGTHS
+from alphacut.base.units import factor_of
 
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 """A number in plain ASCII digits."""
@@ -158,8 +159,8 @@ def _column(header: list[str], name: str, path: Path) -> tuple[int, float]:
     for column, cell in enumerate(header):
         # The name of the column, and its unit in round or square brackets.
         match = re.fullmatch(r"\s*(\w+)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*", cell)
-        if match and match[1].lower() in factors and match[2] in METRES:
-            return column, METRES[match[2]] * factors[match[1].lower()]
+        if match and match[1].lower() in factors and (metres := factor_of(match[2] or "", "m")):
+            return column, metres * factors[match[1].lower()]
     allowed = f"a column '{name} [mm]'"
     if name == "r":
         allowed += " or 'd [mm]'"

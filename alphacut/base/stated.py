@@ -14,18 +14,6 @@ from math import isclose
 
 from alphacut.base.errors import RefusedError, require
 
-METRES = {
-    "pm": 1e-12, "å": 1e-10, "angstrom": 1e-10, "nm": 1e-9, "um": 1e-6, "µm": 1e-6, "μm": 1e-6,
-    "micron": 1e-6, "microns": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1.0, "km": 1e3,
-    "in": 0.0254, "inch": 0.0254, "inches": 0.0254, "ft": 0.3048, "foot": 0.3048, "feet": 0.3048,
-}  # fmt: skip
-"""Metres in a unit of length, in small letters. The micro sign and the Greek letter look alike."""
-PREFIXES = {"nano": 1e-9, "micro": 1e-6, "milli": 1e-3, "centi": 1e-2, "": 1.0}
-METRES |= {
-    f"{prefix}{word}": factor
-    for prefix, factor in PREFIXES.items()
-    for word in ("meter", "meters", "metre", "metres")
-}
 LENGTHS = "nm, um, mm, cm, m, in or ft"
 """Units of length that messages name."""
 
@@ -58,6 +46,7 @@ def settled(
     *,
     override: Collection[str] = (),
     tolerance: float = 1e-6,
+    unsure: Iterable[Stated] = (),
 ) -> Stated | None:
     """Return what counts of a file's statements on one thing and what the user says of it.
 
@@ -68,6 +57,8 @@ def settled(
         said: What the user says; None if nothing.
         override: Keys of which the user says that the file is wrong.
         tolerance: Relative difference up to which two values are the same, as by rounding.
+        unsure: Statements that may be of something else: they are never taken, and where the file
+            has no other one of them must be what the user says. NaN is like no value.
 
     Returns:
         The first statement of the file, or what the user says where there is none or the user
@@ -87,6 +78,14 @@ def settled(
         if said is None and not isclose(each.value, first.value, rel_tol=tolerance):
             cure = f'mend one, or say {key} and override = ["{key}"]'
             raise RefusedError(name, f"of {key} {first} and {each}", f"one {key}", cure)
+    doubtful = list(unsure)
+    if first is None and said is not None and key not in override:
+        is_among = any(isclose(x.value, said.value, rel_tol=tolerance) for x in doubtful)
+        shown = " and ".join(map(str, doubtful))
+        cure = f'say override = ["{key}"] if that is something else'
+        require(
+            is_among or not doubtful, name, f"of {key} {shown}", f"{key} {said}, as is said", cure
+        )
     return first or said
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo
 
 from alphacut.base.errors import RefusedError, is_number, require, require_choice
+from alphacut.base.units import ACCELERATION, factor_of
 from alphacut.case.generated import section_at
 from alphacut.case.structure import Structure
 from alphacut.case.types import (
@@ -31,7 +32,6 @@ from alphacut.frame import History, StoreyFrame
 from alphacut.frame.records.recording import Baseline, Recording
 from alphacut.frame.records.suite import MAX_RECORDS, read_recordings, require_distinct
 from alphacut.frame.records.text_file import ACCELERATION_UNITS, require_stated_step
-from alphacut.frame.records.units import acceleration_factor
 from alphacut.frame.structures.model import PlacedForce
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io import quantity
@@ -303,7 +303,7 @@ def _step_of_record(step: float) -> float:
 def _parse_unit(value: object, _: ValidationInfo) -> str:
     """Return a unit of accelerations as it was given, or refuse it."""
     # The unit is converted with the file, so that messages can show it as it was given.
-    is_unit = acceleration_factor(str(value)) is not None
+    is_unit = factor_of(str(value), ACCELERATION) > 0
     require(is_unit, "", value, f"a unit of {ACCELERATION_UNITS}")
     return str(value)
 

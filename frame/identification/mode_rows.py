@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,15 @@ from alphacut.base.arrays import Array
 from alphacut.base.csv_columns import fields, number, text_of
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.stated import Stated, settled
+from alphacut.base.units import (
+    FREQUENCY,
+    TRANSFORMED,
+    Mention,
+    factor_of,
+    mentions,
+    unit_of,
+    without_units,
+)
 from alphacut.frame.records.stated import FACTOR
 
 
@@ -39,14 +49,15 @@ class ModeRows:
     shape_deviation: float | None = None
 
 
-# Hz in a unit of frequency, in small letters; 0 of angular frequencies and periods.
-HERTZ = {
-    "hz": 1.0, "khz": 1e3, "hertz": 1.0, "cps": 1.0, "cycles/s": 1.0, "cycles/sec": 1.0,
-    "cycle/s": 1.0, "cycles per second": 1.0, "rad/s": 0.0, "rad/sec": 0.0, "rpm": 0.0,
-    "1/min": 0.0, "radians per second": 0.0, "radians/second": 0.0, "rad s-1": 0.0, "rad*hz": 0.0,
-    "cpm": 0.0, "1/s": 0.0, "s^-1": 0.0, "kilohertz": 1e3, "millihertz": 1e-3,
-    "c.p.s.": 1.0, "oscillations per second": 1.0, "mhz": 1e-3,
-}  # fmt: skip
+# Words of numbers that are no frequencies in a unit, but periods, angular ones or quotients.
+_OTHER_NUMBERS = (
+    r"(?i)\b(?:periods?|omega\w*|angular|circular|pulsations?|eigenvalues?|lambda|2\s*[x×*·]?\s*pi"
+    r"|ratios?|per\s?cent|perioden?)\b|ω|2\s*[x×*·]?\s*π|^T\b|\bf\w?\s*/\s*f"
+    rf"|{FACTOR}|{TRANSFORMED}|\bper\s+minute|\b(?:kreis|winkel)frequen"
+)
+_RELATIVE = (
+    r"(?i)(?:std|deviation|scatter|error|uncertaint)\w*\b.*(?:%|\bper\s?cent|\brelative|\bratio)"
+)
 
 
 def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tuple[ModeRows, ...]:
@@ -76,37 +87,32 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
     (head_row, header), *rows = fields(path)
     columns: dict[str, int] = {}
     units: dict[str, str] = {}
+    # Units may stand in a row of their own below the names.
+    cells_of_units = [""] * len(header)
+    if rows and all(cell.strip(" -–[]()") == "" or unit_of(cell) for cell in rows[0].cells):
+        cells_of_units = [cell.strip(" -–") for cell in rows.pop(0).cells]
     for column, cell in enumerate(header):
-        pattern = r"\s*([\w .]*?)(?:[\s,_]*[\[(]\s*([^\])]*?)\s*[\])]|[_ ](k?hz))?\s*"
-        title = re.fullmatch(pattern, cell, re.IGNORECASE)
-        name = title[1] if title else cell
+        title = _title(cell)
+        name = title.name
         if re.fullmatch(r"(?i)(?:natural |eigen|modal )?freq(?:uency|\.)?|f_?n?", name):
             name = "frequency"
         elif re.fullmatch(r"(?i)mode(?:[_ ]?(?:no|nr|number))?\.?|no\.?|nr\.?", name):
             name = "mode"
         columns[name] = column
-        units[name] = (title[2] or title[3] or "") if title else ""
+        units[name] = title.unit or "".join(cells_of_units[column : column + 1])
     place = f"{path.name}, header"
     shown = ",".join(header)[:80]
-    comments = [x for x in text_of(path).splitlines() if x.startswith("#")]
     if not override:
-        words = (
-            r"(?i)\b(?:periods?|omega\w*|angular|circular|pulsation|eigenvalues?|lambda|2\s*pi)\b"
-        )
-        words += rf"|ω|2\s*π|^T\b|{FACTOR}|\bscaled\s+by\b|\bper\s+minute|/\s*min\b"
-        # Angular frequencies and ratios, and words glued before a frequency, as "Kreisfrequenz".
-        words += r"|\bpulsations\b|2\s*[x×*·]\s*(?:pi\b|π)"
-        words += r"|\b(?:rad|deg)\w*\W*(?:per\s+)?s(?:ec\w*)?\b"
-        words += r"|\b(?:ratios?|divided|log(?:10|arithm\w*)?)\b|\bf\w?\s*/\s*f"
-        words += r"|\b(?!(?:eigen|natural|modal|resonan\w{0,2})freq)[a-zäöü]+frequen[cz]"
-        words += r"|\bsquared|hz(?:\^|²)|\bin\s+[\d.]+\s*k?hz"
-        words += r"|(?:frequenc\w+|values)\s+(?:are\s+)?normali"
-        if {"frequency_std", "shape_std"} & columns.keys():
-            words += r"|(?:std|deviation|scatter|error|uncertaint)\w*\b"
-            words += r".*(?:%|\bper\s?cent|\brelative)"
-        other = next((x for x in [*header, *comments] if re.search(words, x.strip())), "")
-        cure = "write frequencies in Hz, ω/(2π) or 1/T, and deviations in Hz, without a factor"
-        require(not other, place, other[:80], "frequencies, not angular ones or periods", cure)
+        comments = [x for x in text_of(path).splitlines() if x.startswith("#")]
+        for text in [*header, *comments]:
+            rest = without_units(text, mentions(text))
+            is_other = re.search(_OTHER_NUMBERS, rest.strip(" #")) is not None
+            is_other |= re.search(r"(?i)(?:%|\bper\s?cent)\s+of\b", text) is not None
+            if {"frequency_std", "shape_std"} & columns.keys():
+                is_other |= re.search(_RELATIVE, text) is not None
+            cure = "write frequencies in Hz, ω/(2π) or 1/T, and deviations in Hz, without a factor"
+            allowed = "frequencies, not angular ones or periods"
+            require(not is_other, place, text[:80], allowed, cure)
     allowed = (
         "mode,frequency [Hz],q1,q2 … with the floors that were measured, in one unit; frequency_std"
         " [Hz] and shape_std may stand before q1"
@@ -118,12 +124,16 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
     is_known = is_known and len({x for name, x in units.items() if name[0] == "q"}) < 2
     require(is_known, place, shown, allowed)
     stated: list[Stated] = []
+    unsure: list[Stated] = []
     if not override:
         of_head = [x for name, x in units.items() if name[:1] == "f" and x]
         stated = [Stated(_hertz_of(place, x), x, place) for x in of_head]
-        stated += _units_in_comments(path, head_row)
+        for row, line in enumerate(text_of(path).splitlines(), 1):
+            if line.startswith("#") and row != head_row:
+                for one in mentions(line):
+                    _add_unit(one, f"line {row}", path.name, stated, unsure)
     said = Stated(_hertz_of("frequency_unit", unit), unit) if unit else None
-    found = settled(path.name, "frequency_unit", stated, said)
+    found = settled(path.name, "frequency_unit", stated, said, unsure=unsure)
     cure = "write the unit into the header, frequency [Hz], or say frequency_unit"
     if found is None:
         raise RefusedError(place, f"{shown}, without a unit", "frequencies with a unit", cure)
@@ -149,26 +159,61 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
     )
 
 
+class _Title(NamedTuple):
+    """Name and unit in the head of a column."""
+
+    name: str
+    unit: str
+
+
+def _title(cell: str) -> _Title:
+    """Return name and unit of a cell of the header, as "f [Hz]", "f / Hz" or "f_Hz"."""
+    match = re.fullmatch(r"\s*([\w .]*?)[\s,_]*[\[(]\s*([^\])]*?)\s*[\])]\s*", cell)
+    if match is None:
+        match = re.fullmatch(r"\s*([\w .]*?)\s*[/_ ]\s*(\S+)\s*", cell)
+        if match is None or not factor_of(match[2], FREQUENCY):
+            return _Title(cell.strip(), "")
+    return _Title(match[1], match[2])
+
+
 def _hertz_of(place: str, unit: str) -> float:
-    """Return Hz in a unit of frequency, 0 of angular frequencies; refuse others."""
-    hertz = None if "MH" in unit else HERTZ.get(unit.strip().lower())  # 1 MHz is not 1 mHz
-    if not hertz:
-        cure = "divide by 2π, or by 60" if hertz == 0 else ""
+    """Return Hz in a unit of frequency; refuse others, angular ones among them."""
+    hertz = factor_of(unit, FREQUENCY)
+    if hertz not in (1.0, 1e3, 1e-3):
+        cure = "divide by 2π, or by 60" if unit_of(unit) else ""
         raise RefusedError(place, f"in {unit}", "frequencies in Hz, kHz or cycles/s", cure)
     return hertz
 
 
-def _units_in_comments(path: Path, head_row: int) -> Iterator[Stated]:
-    """Yield units of frequency in the comments of a file; angular ones and periods are refused."""
-    pattern = "|".join(re.escape(unit) for unit in sorted(HERTZ, key=len, reverse=True))
-    for row, line in enumerate(text_of(path).splitlines(), 1):
-        if line.startswith("#") and row != head_row:
-            # Behind a number it is no unit of others, as in "sampled at 200 Hz".
-            found = re.search(rf"(?<![\w/.])(?<!\d )(?:{pattern})(?!\w)", line, re.IGNORECASE)
-            place = f"{path.name}, line {row}"
-            is_sampling = re.search(r"(?i)sampl|filter|band|resolution|\bdf\b", line)
-            if found and (not is_sampling or re.search(r"(?i)\bunit", line)):
-                yield Stated(_hertz_of(place, found[0]), found[0], f"line {row}")
+def _add_unit(
+    one: Mention, place: str, name: str, stated: list[Stated], unsure: list[Stated]
+) -> None:
+    """Add a unit in a comment to those of the frequencies, or to those that may be of others.
+
+    Args:
+        one: The unit, with the number beside it.
+        place: The line.
+        name: Name of the file, for messages.
+        stated: Units of the frequencies, as factors to Hz.
+        unsure: Units of values that may be others.
+
+    Raises:
+        RefusedError: It is that of an angular frequency or of a period, or has a factor.
+    """
+    is_of_others = re.search(r"(?i)sampl|filter|band|resolution|\bdf\b|abtast|sensor", one.before)
+    is_named = re.search(r"(?i)\bunit", one.before) is not None
+    is_angular = one.dimension in ("rad s-1", "cycle rad s-1", "s-1", "cycle2 s-2", "rad2 s-2")
+    is_period = one.dimension == "s" and one.is_sure and not one.numbers
+    if (is_angular or is_period) and (is_named or not is_of_others):
+        _hertz_of(f"{name}, {place}", one.text)
+    if one.dimension != FREQUENCY or (is_of_others and not is_named):
+        return
+    is_multiple = one.numbers and re.search(r"(?i)\b(?:in|units?(?:\s+of)?)\W*$", one.before)
+    if is_multiple or not one.numbers:
+        hertz = _hertz_of(f"{name}, {place}", one.shown if is_multiple else one.text)
+        stated.append(Stated(hertz, one.text, place))
+    else:
+        unsure.append(Stated(one.unit.factor, one.shown, place))
 
 
 def _measurements_of_mode(

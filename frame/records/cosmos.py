@@ -16,11 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.base.arrays import Array
+from alphacut.base.units import ACCELERATION, factor_of
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak, peaks_in_text
 from alphacut.frame.records.stated_timing import require_timing, timing_in_text
 from alphacut.frame.records.text_file import TextFile, choose_channel, recording_in_si
-from alphacut.frame.records.units import acceleration_factor
 
 # A FORTRAN format such as (8f10.6). Its groups are the numbers in a line (8; empty for one) and the
 # characters of each (10). The decimals do not matter, since samples are written with their points.
@@ -165,8 +165,8 @@ def _read_cosmos(file: TextFile, channel: _Channel, unit: str) -> Recording:
     )
     stated = []
     peak = float(header[63])  # entry 64 of the format's description, which counts from 1
-    to_si = acceleration_factor(unit)
-    if peak != -999 and to_si is not None:  # -999 stands for an entry that is not known
+    to_si = factor_of(unit, ACCELERATION)
+    if peak != -999 and to_si:  # -999 stands for an entry that is not known
         time = max(float(header[64]), 0.0)  # -999 as well
         stated.append(StatedPeak(to_si * abs(peak), time=time))
     step = _cosmos_step(file, channel.reals, header, count=count, duration=duration)

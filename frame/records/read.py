@@ -16,6 +16,7 @@ from alphacut.base.entry_points import registered
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.extras import extra_named
 from alphacut.base.stated import Stated, settled
+from alphacut.base.units import ACCELERATION, factor_of
 from alphacut.frame.records.cosmos import is_cosmos, read_cosmos
 from alphacut.frame.records.geonet import is_geonet, read_geonet
 from alphacut.frame.records.networks import FORMATS, RecordFormat
@@ -24,7 +25,6 @@ from alphacut.frame.records.stated_peak import StatedPeak
 from alphacut.frame.records.tables import is_table, read_table
 from alphacut.frame.records.text_file import TextFile, choose_channel, read_bytes, recording_in_si
 from alphacut.frame.records.uff import is_universal, read_uff_record
-from alphacut.frame.records.units import acceleration_factor
 
 
 def read_recording(
@@ -87,8 +87,8 @@ def _agreed(
     own = Stated(recording.step, f"{recording.step:.6g} s")
     said = Stated(step, f"{step:.6g} s") if step is not None else None
     taken_step = settled(name, "step", [own], said, override=override) or own
-    own = Stated(acceleration_factor(recording.unit) or 1.0, recording.unit)
-    said = Stated(acceleration_factor(unit) or 1.0, unit) if unit else None
+    own = Stated(factor_of(recording.unit, ACCELERATION) or 1.0, recording.unit)
+    said = Stated(factor_of(unit, ACCELERATION) or 1.0, unit) if unit else None
     taken_unit = settled(name, "unit", [own], said, override=override) or own
     remarks = tuple(filter(None, (taken_step.remark, taken_unit.remark)))
     return replace(
@@ -231,8 +231,8 @@ def _read_waveform(
 
 def _sac_peak(head: Mapping[str, Any], unit: str) -> list[StatedPeak]:
     """Return the peak that the head of a SAC file states in a unit; none of another format."""
-    to_si = acceleration_factor(unit)
-    if to_si is None or not {"depmin", "depmax"} <= head.keys():
+    to_si = factor_of(unit, ACCELERATION)
+    if not to_si or not {"depmin", "depmax"} <= head.keys():
         return []
     magnitude = max(abs(float(head["depmin"])), abs(float(head["depmax"])))
     return [StatedPeak(to_si * magnitude)]

@@ -3,76 +3,67 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
-from math import isclose
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from math import isclose, nan
 
 from alphacut.base.errors import RefusedError
+from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.base.stated import Stated
-from alphacut.frame.records.text_file import TextFile
-from alphacut.frame.records.units import (
-    GALS,
-    PER_SECOND_SQUARED,
-    acceleration_factor,
-    other_quantity,
-    seconds_of,
+from alphacut.base.units import (
+    ACCELERATION,
+    FREQUENCY,
+    TRANSFORMED,
+    Mention,
+    mentions,
+    without_units,
 )
+from alphacut.frame.records.text_file import MAX_STEP, MIN_STEP, TextFile
 
-_NUMBER = r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?)"
-# Words in place of symbols, as "centimeters per second squared".
-_SPELLED = {
-    r"centi-?met(?:er|re)s?": "cm",
-    r"milli-?met(?:er|re)s?": "mm",
-    r"\bmet(?:er|re)s?": "m",
-    r"\s*\bper\s+(?:square\s+sec(?:ond)?|sec(?:ond)?s?[\s-]*(?:squared|per[\s-]*sec(?:ond)?))": (
-        "/s^2"
-    ),
-    r"\s+per\s+": "/",
-    r"\bper\s?cent\s+(?:of\s+)?(?:gravity|g)\b": "%g",
-    r"\b(?:standard|fractions?\s+of|units?\s*[:=]?(?:\s*of)?)\s+gravity": "(g)",
-    # The acceleration of gravity, as "g = 9.81 m/s2".
-    r"(?:\bg\s*=\s*)?\b(?:9\.8\d*\s*\(?m|98[01]\.?\d*\s*\(?(?:cm|gal)|386\.\d*\s*in"
-    r"|32\.\d*\s*ft)\S*": "",
-    r"(?<=\bacc)(\w*\.?)\s*/\s*\(?": r"\1 (",
-    # Systems of units, and the symbol of standard gravity.
-    r"\bcgs\b": "(cm/s^2)",
-    r"\bSI\s+units?\b|\bunits?\W+SI\b": "(m/s^2)",
-    r"\bg_n\b(?!\s*=)": "(g)",
-    r"\blengths?\W+(?:units?\W+|in\W+)?([cm]?m|in|ft)\b(?=.*\btimes?\W.*\bs(?:ec)?\b)": r"\1/s^2",
-}
-_SPELLED_WORDS = re.compile("|".join(_SPELLED), re.IGNORECASE)
-# A unit of acceleration that cannot be something else; not part of a quotient such as V/(m/s^2).
-_UNIT = (
-    rf"(?<![a-z0-9/])(?<!/\()(?:{PER_SECOND_SQUARED}|{'|'.join(GALS)}|milli-?g|mg|%\s?g"
-    r"|g\s?/\s?10|10\s?\*\s?g)(?![a-z0-9]|\s*/)"
+_RATES = (FREQUENCY, "s-1 sample")
+_PEAK = r"(?i)\b(?:peak|pg[avd]|pk|[av]?max\w*|min\w*|extrem\w*)\b"
+# Numbers of the instrument.
+_SENSOR = (
+    r"(?i)sensitiv|full.?scale|\brange|clip|trigger|thresh|noise|resolution|\bgain|\bres\b|offset"
 )
-# The letter g is the unit in brackets, behind "units" or "in", or at the end of such a line.
-_G = (
-    r"[\[(]\s*(g'?s?)\s*[\])]|\bunits?\b[^a-z]*(?:(?:of|are|is|in)\b)?\W*(g'?s?)\b(?!\s*/|\w)"
-    r"|\bin\s+[(\"']?(g'?s?)\b(?!\s*/)|\b(g)\s+units?\b|\b(?:acc\w*|ordinates?|amplitudes?|values?|data)\W+(g'?s?)\W*$"
-)
-_OTHER_UNIT = r"\bunits?\b\s*(?:(?:of|are|is|in)\b)?[\s:=]*[\[(]?([^\s,;\])]+)"
+_SITE = r"(?i)altitude|height|elevation|depth|coordinate|vs_?30|\bwave|peak|pg[vd]|distance"
 FACTOR = (
     r"(?:[x×*·]\s*|\b)10\s*(?:\^|\*\*|⁻|[²³⁴⁵⁶])|[x×*·]\s*10\s*[-−]\s*\d|\b1\.?0*e[-+]?\d"
-    r"|[x×]\s*(?:1000*\b|0?\.\d)"
+    r"|[x×*·]\s*(?:1000*\b|0?\.\d)"
     r"|\b(?:scal\w*[\s_]*factor|scal\w*(?=\s*[:=])|multipl\w*|divided|conversion)[\s:=]*(?:by\s+)?"
-    r"(?!1(?:\.0*)?\b)[\d.]|[2²]\s*/\s*\d|\b(?:of|in|is)\s+\d*\.?\d+\s*g\b"
+    r"(?!1(?:\.0*)?\b)[\d.]"
 )
-_INTERVAL = (
+# Words of times between samples, in some languages, and words of other times and frequencies.
+_SAMPLING = (
+    r"(?i)sampl|digiti|abtast|[ée]chant|muestre|campion|amostr|step|interval|spac(?:ed|ing)|increment"
+    r"|every|schritt|paso|\bpas\b|passo|\brate|acquisition|(?<![a-z])d(?:elta)?[\s_-]*t(?![a-z])|Δ|\bdelta|@"
+    r"|(?<![a-z])[ft]s\b"
+)
+_OTHER_TIMES = (
+    r"(?i)filter|pass\b|corner|cut|band|butter|natur|resonan|predomin|trigger|origin|delay|event|taper"
+    r"|smooth|damp|respon|duration|peak|max|pg[avd]|window|sensor|seism|instrument|clock|drift|arriv"
+    r"|roll|usable|lowest|highest|low\b|high\b"
+)
+# Between a word and the number without a unit that it states.
+_BEHIND = r"[\s_]*(?:[\s:=@\"',]|\.{2,})*(?:(?:is|was|of|at|with|by)\s+)?"
+_NUMBER = r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?)(?![\d.]*\w)"
+_BARE_STEP = re.compile(
     r"(?:\b(?:sampl\w*|time|data|digiti[sz]\w*)[\s_-]*(?:interval|step|period|spacing|increment)s?"
-    r"|\b(?:time|sampl)\w*|\b(?:interval|step|increment)s?|(?<![a-z])d(?:elta)?[\s_-]*t|Δt|\bdelta)"
+    r"|\b(?:interval|step|increment)s?|(?<![a-z])(?:d(?:elta)?[\s_-]*t|ts)|Δt|\bdelta)"
+    rf"{_BEHIND}{_NUMBER}",
+    re.IGNORECASE,
 )
-_RATE = (
+_BARE_RATE = re.compile(
     r"(?:\b(?:sampl\w*|digiti[sz]\w*|acquisition|data)[\s_-]*(?:rate|freq\w*)|(?<![a-z])fs\b"
-    r"|\bsamples?/s(?:ec(?:ond)?)?|\bsps"
-    r"|^\W*rate(?=\s*[:=])|(?:\bsampl\w*|\brate|\bdigiti[sz]\w*|@)"
-    r"(?=(?:(?!filt|pass|corner|cut|band)[^\d\n]){0,20}[\d.]+\s*k?hz))"
+    rf"|^\W*rate(?=\s*[:=])){_BEHIND}{_NUMBER}",
+    re.IGNORECASE,
 )
-_BEHIND = (
-    r"[\s_]*(?:between\s+\w+\s*)?(?:[\[(](?P<before>[^\])]*)[\])]|/\s*(?P<slash>[mµu]?s)\b)?"
-    r"(?:[\s:=@\"',]|\.{2,})*"
-    r"(?:(?:is|was|of|at|with|by)\s+)?"
+_COUNT = re.compile(
+    r"\b(?:npts?|ndata|n_?samples|points|samples|n(?:umber|o|um|r)?\.?\s*(?:of)?\s*"
+    r"(?:data|points|samples|values|pts))\s*[:=]\s*(\d+)\b(?![./:-])",
+    re.IGNORECASE,
 )
+_SYSTEMS = {r"\bcgs\b": "cm/s^2", r"\bSI\s+units?\b|\bunits?\W+SI\b": "m/s^2"}
 
 
 @dataclass
@@ -80,8 +71,12 @@ class TextStatements:
     """What some lines of a file state.
 
     Args:
-        units: Units of acceleration, as factors to m/s²; those of peaks alone stand last.
+        units: Units of acceleration, as factors to m/s².
+        peak_units: Those of peaks.
+        unsure_units: Units that may be other words.
         steps: Times between samples, in s.
+        unsure_steps: Times, and the reciprocals of frequencies, that may be other ones.
+        durations: Durations, in s.
         counts: Numbers of samples.
         quantities: Lines that name another quantity than an acceleration, by its name.
         factors: Lines with a power of ten beside a unit.
@@ -90,7 +85,10 @@ class TextStatements:
 
     units: list[Stated] = field(default_factory=list)
     peak_units: list[Stated] = field(default_factory=list)
+    unsure_units: list[Stated] = field(default_factory=list)
     steps: list[Stated] = field(default_factory=list)
+    unsure_steps: list[Stated] = field(default_factory=list)
+    durations: list[Stated] = field(default_factory=list)
     counts: list[Stated] = field(default_factory=list)
     quantities: list[tuple[str, int]] = field(default_factory=list)
     factors: list[int] = field(default_factory=list)
@@ -102,67 +100,114 @@ class TextStatements:
         found = cls()
         for row in lines:
             text = file.lines[row]
-            if _SPELLED_WORDS.search(text):  # few lines have any, and one search is quicker
-                for pattern, symbol in _SPELLED.items():
-                    text = re.sub(pattern, symbol, text, flags=re.IGNORECASE)
-            # As "1/100 sec".
-            text = re.sub(r"\b1/(\d{2,5})(?=\s*s)", lambda x: f"{1 / int(x[1]):.9g}", text)
             place = f"line {file.line_number(row)}"
             for clause in text.split(";"):
-                found._add_units(clause, row, place)
-            found.steps += _steps(text, place)
-            pattern = (
-                r"\b(?:npts?|ndata|n_?samples|points|samples|n(?:umber|o|um|r)?\.?\s*(?:of)?\s*"
-                r"(?:data|points|samples|values|pts))\s*[:=]\s*(\d+)\b(?![./:-])"
-            )
-            for match in re.finditer(pattern, text, re.IGNORECASE):
+                found._add_clause(clause, row, place)
+            for match in _COUNT.finditer(text):
                 found.counts.append(Stated(float(match[1]), f"{match[1]} samples", place))
         return found
 
-    def _add_units(self, text: str, row: int, place: str) -> None:
-        """Add the units, the factors and the other quantities that a line names."""
-        is_of_sensor = re.search(
-            r"sensitiv|full.?scale|\brange|clip|trigger|thresh|noise|resolution|\bgain|1\s*g\s*=",
-            text,
-            re.IGNORECASE,
-        )
-        if is_of_sensor and not re.search(r"\bunits?\b", text, re.IGNORECASE):
-            if re.search(r"\bcounts\b", text, re.IGNORECASE):
-                self.quantities.append(("a number of counts", row))
-            return
-        is_peak = re.search(r"\b(?:peak|pg[avd]|pk|max\w*|min\w*)\b", text, re.IGNORECASE)
-        found_units = list(re.finditer(_UNIT, text, re.IGNORECASE))
-        units = [match[0] for match in found_units]
-        is_multiple = any(re.search(r"\d\s*$", text[: match.start()]) for match in found_units)
-        for match in re.finditer(_G, text, re.IGNORECASE):
-            units += filter(None, match.groups())
-        into = self.peak_units if is_peak else self.units
-        for unit in units:
-            into.append(Stated(acceleration_factor(unit) or 0.0, unit, place))
-        if not is_peak and (is_multiple or re.search(FACTOR, text, re.IGNORECASE)):
+    def _add_clause(self, text: str, row: int, place: str) -> None:
+        """Add what a line, or a part of it between semicolons, states."""
+        all_units = mentions(text)
+        rest = without_units(text, all_units)
+        units: list[Mention] = []
+        for one in all_units:
+            # The acceleration of gravity, as "1 g = 9.81 m/s2", is no unit of the samples.
+            is_gravity = one.dimension == ACCELERATION and one.unit.factor != STANDARD_GRAVITY
+            is_gravity &= any(isclose(x, STANDARD_GRAVITY, rel_tol=0.005) for x in one.values)
+            if not is_gravity:
+                units.append(one)
+            elif units and one.before.lstrip().startswith("="):
+                units.pop()
+        is_peak = re.search(_PEAK, text) is not None
+        for one in units:
+            if one.dimension == ACCELERATION:
+                self._add_unit(one, row, place, is_peak=is_peak)
+            elif one.dimension == "s" and not one.numbers:
+                if re.search(
+                    r"(?i)\b(?:time|abscissa)s?\b[\s,:=(\[]*(?:in\s+)?$|\bt\W*$", one.before
+                ):
+                    self.time_units.append(Stated(one.unit.factor, one.text, place))
+            elif one.numbers and one.dimension in ("s", "s sample-1", *_RATES):
+                self._add_time(one, place, is_peak=is_peak)
+            elif not is_peak and not re.search(_SITE, text):
+                self._add_other(one, row)
+        for pattern, unit in _SYSTEMS.items():
+            if re.search(pattern, text, re.IGNORECASE):
+                self.units.append(Stated({"cm/s^2": 0.01}.get(unit, 1.0), unit, place))
+        lengths = [x for x in all_units if x.dimension == "m" and not x.numbers]
+        if lengths and re.search(r"(?i)\blengths?\b.*\btimes?\W+(?:in\W+)?s(?:ec)?\b", text):
+            self.units.append(Stated(lengths[0].unit.factor, f"{lengths[0].text}/s^2", place))
+        if not is_peak and re.search(f"{FACTOR}|{TRANSFORMED}", rest, re.IGNORECASE):
             self.factors.append(row)
-        of_times = r"\b(?:time|abscissa)s?\b[\s,:=(\[]*(?:in\s+)?([a-zµμ]+)"
-        for found in re.finditer(of_times, text, re.IGNORECASE):
-            if seconds_of(found[1]):
-                self.time_units.append(Stated(seconds_of(found[1]), found[1], place))
-        # A unit of another quantity, behind the word "unit", or in brackets if it is no length or
-        # angle, which are those of the site.
-        others = re.findall(_OTHER_UNIT, text, re.IGNORECASE)
-        is_of_site = r"(?i)altitude|height|elevation|depth|coordinate|vs_?30|\bwave|peak|pg[vd]"
-        others += [x for x in re.findall(r"[\[(]([^\])]*)[\])]", text) if not seconds_of(x)]
-        for unit in others:
-            name = other_quantity(unit.strip('"'))
-            is_length = "displacement" in name or "angle" in name
-            is_named = re.search(r"\bunits?\b", text, re.IGNORECASE) is not None
-            if name and (is_named or not is_length) and not re.search(is_of_site, text):
-                self.quantities.append((f"{name} by its unit {unit}", row))
+        for pattern, is_rate in ((_BARE_STEP, False), (_BARE_RATE, True)):
+            for match in pattern.finditer(rest):
+                number = float(match["number"].lower().replace("d", "e"))
+                if number > 0:
+                    text_of_it = f"{match['number']} {'Hz' if is_rate else 's'}"
+                    self.steps.append(_step(number, text_of_it, place, is_rate=is_rate))
         # Loads, angles and drifts of an instrument or a site are no quantity of the numbers.
-        name = named_quantity(text)
+        name = named_quantity(rest)
         is_quantity = name.endswith(
             ("displacement", "velocity", "spectrum", "counts", "voltage", "jerk", "acceleration")
         )
-        if is_quantity and not is_peak and not re.search(is_of_site, text):
+        if is_quantity and not is_peak and not re.search(_SITE, text):
             self.quantities.append((name, row))
+
+    def _add_unit(self, one: Mention, row: int, place: str, *, is_peak: bool) -> None:
+        """Add a unit of acceleration: of samples, of peaks, or one that may be another word."""
+        if re.search(_SENSOR, one.before) and not re.search(r"(?i)\bunits?\b", one.before):
+            return
+        stated = Stated(one.unit.factor, one.text, place)
+        is_multiple = one.numbers not in ((), (1.0,))
+        is_multiple |= re.match(r"\W*[/*×·]\s*\d", one.behind) is not None
+        if is_peak:
+            self.peak_units.append(stated)
+        elif one.is_sure:
+            self.units.append(stated)
+            if is_multiple:
+                self.factors.append(row)
+        else:
+            self.unsure_units.append(replace(stated, value=nan) if is_multiple else stated)
+
+    def _add_other(self, one: Mention, row: int) -> None:
+        """Add the quantity of a unit that is none of acceleration, where it is of the samples."""
+        if "sample" in one.dimension or not one.is_sure or one.numbers:
+            return
+        is_named = re.search(r"(?i)\bunits?\b[^,]*$", one.before) is not None
+        # Lengths and angles in brackets are those of the site.
+        is_bracketed = one.before.rstrip().endswith(("(", "[")) and one.dimension not in (
+            "m",
+            "rad",
+        )
+        name = one.unit.other_quantity
+        if one.dimension in ("m2 s-4", "m2 s-3", "m2 s-2"):
+            name = "another quantity"
+            is_named = True
+        if name and (is_named or is_bracketed or one.dimension == "count"):
+            self.quantities.append((f"{name} by its unit {one.text}", row))
+
+    def _add_time(self, one: Mention, place: str, *, is_peak: bool) -> None:
+        """Add a time or a frequency: a step, one that may be a step, or a duration."""
+        value = one.values[0]
+        around = f"{one.before[-60:]} | {one.behind[:30]}"
+        is_rate = one.dimension in _RATES
+        stated = _step(value or nan, one.shown, place, is_rate=is_rate)
+        is_sampling = re.search(_SAMPLING, around) is not None or "sample" in one.dimension
+        # As "acceleration (g) over time (1/100 s)".
+        is_sampling |= re.search(r"(?i)\btimes?\s*[\[(]\s*$", one.before) is not None
+        if re.search(r"(?i)nyquist", around):
+            self.unsure_steps.append(Stated(stated.value / 2, stated.text, place))
+        elif re.search(r"(?i)decimat|resampl|interpolat|half|every\s+(?:other|third)", around):
+            self.unsure_steps.append(Stated(nan, one.shown, place))
+        elif re.search(r"(?i)duration|dauer|dur[ée]e|duraci", one.before):
+            self.durations.append(Stated(value, one.shown, place))
+        elif is_sampling:
+            if re.search(r"(?i)filter|pass\b|corner|cut.?off|band", one.before) is None:
+                self.steps.append(stated)
+        elif not is_peak and MIN_STEP <= stated.value < MAX_STEP:
+            self.unsure_steps += [] if re.search(_OTHER_TIMES, around) else [stated]
 
 
 def named_quantity(text: str) -> str:
@@ -188,43 +233,11 @@ def named_quantity(text: str) -> str:
     return ""
 
 
-def _steps(text: str, place: str) -> Iterator[Stated]:
-    """Yield the steps that a line states: intervals in a unit of time, and rates."""
-    interval = rf"{_INTERVAL}{_BEHIND}{_NUMBER}\s*[\[(]?(?P<unit>[a-zµμ]*)"
-    backwards = (
-        rf"(?<![\w.]){_NUMBER}\s*(?P<unit>[a-zµμ]+)[\s-]*(?:sampl\w*|time)?[\s-]*(?:interval|step)s?\b"
-        rf"|\b(?:every\s|spaced\s+at\s|intervals?\s+of\s|time\s*[\[(])\s*(?P<number2>\d*\.?\d+)\s*(?P<unit2>[a-zµμ]+)"
-    )
-    for match in re.finditer(interval, text, re.IGNORECASE):
-        before = match["before"] or match["slash"]
-        unit = (before or match["unit"] or "").strip()
-        is_bare = before is None and not match["unit"]
-        # "time 12 s" is a time, and "sampling 100" has no unit.
-        words = r"(?i)interval|step|period|spacing|increment|d(?:elta)?_?\s?t|Δt|delta"
-        is_sampling = not is_bare and re.match(r"(?i)sampl", match[0]) is not None
-        is_step = is_sampling or re.search(words, match[0]) is not None
-        factor = 1.0 if is_bare else seconds_of(unit)
-        if factor and is_step:
-            yield _step(match["number"], factor, f"{match['number']} {unit or 's'}", place)
-    for match in re.finditer(backwards, text, re.IGNORECASE):
-        number = match["number"] or match["number2"]
-        unit = match["unit"] or match["unit2"]
-        if seconds_of(unit):
-            yield _step(number, seconds_of(unit), f"{number} {unit}", place)
-    rate = rf"{_RATE}{_BEHIND}{_NUMBER}\s*(?P<unit>kHz)?"
-    rate += r"|(?P<number2>\d+\.?\d*)\s*"
-    rate += r"(?:sps|(?:samples?|points?)/s|(?:hz|(?P<kilo>khz))\s+(?:sampl|digiti))"
-    for match in re.finditer(rate, text, re.IGNORECASE):
-        number = match["number"] or match["number2"]
-        is_kilo = "khz" in (match["unit"] or match["before"] or match["kilo"] or "").lower()
-        hertz = float(number) * (1000 if is_kilo else 1)
-        if hertz > 0:
-            yield Stated(1 / hertz, f"{1 / hertz:.6g} s, of {hertz:g} Hz", place)
-
-
-def _step(number: str, factor: float, text: str, place: str) -> Stated:
-    """Return a step in s from the text of its number and its unit."""
-    return Stated(factor * float(re.sub("[dD]", "e", number)), text, place)
+def _step(value: float, text: str, place: str, *, is_rate: bool) -> Stated:
+    """Return a step, given in s or as samples in a second."""
+    if is_rate:
+        return Stated(1 / value, f"{1 / value:.6g} s, of {text}", place)
+    return Stated(value, text, place)
 
 
 def require_count(name: str, counts: Iterable[Stated], count: int) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import require
 from alphacut.base.number_text import STANDARD_GRAVITY
-from alphacut.frame.records.units import acceleration_factor
+from alphacut.base.units import ACCELERATION, factor_of
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,9 @@ def peaks_in_text(lines: Iterable[str], unit: str) -> Iterator[StatedPeak]:
         for match in re.finditer(pattern, line, re.IGNORECASE):
             own_unit = match["before"] or match["behind"]
             is_without = own_unit.lower() in ("", "at")
-            to_si = acceleration_factor(unit if is_without else own_unit)
+            to_si = factor_of(unit if is_without else own_unit, ACCELERATION)
             magnitude = abs(float(match["number"]))
-            if to_si is None or magnitude == 0:
+            if to_si * magnitude == 0:
                 continue
             # The number is rounded to half a unit of its last decimal: 0.030 to 0.0005, 1.2e2 to 5.
             mantissa, _, exponent = match["number"].lower().partition("e")

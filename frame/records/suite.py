@@ -13,10 +13,10 @@ from typing import get_args
 
 from alphacut.base.errors import RefusedError, checked_number, path_of, require, require_choice
 from alphacut.base.stated import require_overrides
+from alphacut.base.units import ACCELERATION, factor_of
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.records.recording import Baseline, Recording
 from alphacut.frame.records.text_file import ACCELERATION_UNITS, require_stated_step
-from alphacut.frame.records.units import acceleration_factor
 
 # Files of a suite: fragility analyses use 20 to 100 records, and more than 500 files are a mistake
 # in the pattern.
@@ -202,7 +202,7 @@ def _require_arguments(
     if step is not None:
         checked_number("step", step, positive=True)
         require_stated_step("step", step)
-    is_known = isinstance(unit, str) and (not unit or acceleration_factor(unit) is not None)
+    is_known = isinstance(unit, str) and (not unit or factor_of(unit, ACCELERATION) > 0)
     require(is_known, "unit", repr(unit), allowed=f"a unit of {ACCELERATION_UNITS}")
     require_choice("baseline", baseline, get_args(Baseline))
     require_overrides(override, ("unit", "step"))

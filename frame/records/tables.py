@@ -21,6 +21,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.csv_columns import NUMBER
 from alphacut.base.errors import RefusedError, cure_of, require
 from alphacut.base.stated import Stated, settled
+from alphacut.base.units import ACCELERATION, FORCE, factor_of, unit_of
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated import TextStatements, named_quantity, require_count
 from alphacut.frame.records.stated_peak import peaks_in_text
@@ -32,13 +33,6 @@ from alphacut.frame.records.text_file import (
     recording_in_si,
     require_step,
     words_of,
-)
-from alphacut.frame.records.units import (
-    NEWTONS,
-    SECONDS,
-    acceleration_factor,
-    other_quantity,
-    seconds_of,
 )
 
 # The allowed value in messages on the head of a table.
@@ -74,7 +68,7 @@ class _Column:
         match = re.fullmatch(r"(.*?)[\s,_]+(\S+?)", text)
         # Without brackets the last word is a unit only if it is known: "ground acceleration" has
         # none.
-        if match and (acceleration_factor(match[2]) or seconds_of(match[2]) or match[2] in NEWTONS):
+        if match and factor_of(match[2], ACCELERATION, FORCE, "s"):
             return cls(match[1].lower(), match[2])
         return cls(text.lower())
 
@@ -83,7 +77,7 @@ class _Column:
         """Whether the head has times: by their name, or by their unit of time beside no period."""
         if re.match(r"\W*(?:time|t)(?![a-z])(?!.*histor)", self.name):
             return True
-        return seconds_of(self.unit) > 0 and not self.is_abscissa_of_spectrum
+        return factor_of(self.unit, "s") > 0 and not self.is_abscissa_of_spectrum
 
     @property
     def is_abscissa_of_spectrum(self) -> bool:
@@ -275,7 +269,7 @@ def _columns_of(lines: Sequence[str], count: int) -> tuple[list[_Column], int]:
         if len(cells) == 1 or not first.is_time or re.search(r"\d", first.name):
             return [], 0
     units = [cell.strip(' "[]()') for cell in cells]
-    if all(acceleration_factor(x) or seconds_of(x) or other_quantity(x) for x in units):
+    if all(map(unit_of, units)):
         names = _cells_of_head(lines[0], len(cells)) if len(lines) > 1 else []
         pairs = zip(names or [""] * len(cells), units, strict=True)
         return [_Column(name.strip(' "').lower(), unit) for name, unit in pairs], len(lines)
@@ -388,12 +382,16 @@ def read_table(
     if table.heads:
         table.numbers(list(table.rows)[:1])  # names a row of another count of cells
     # Of two columns the first has times, unless both are components.
-    are_components = acceleration_factor(table.columns[0].unit) and not table.columns[-1].is_time
+    are_components = (
+        factor_of(table.columns[0].unit, ACCELERATION) and not table.columns[-1].is_time
+    )
     is_pair = table.width == 2 and step is None and not are_components
     has_times = not is_head and (table.has_times or is_pair)
     known_step = None
     if not has_times:
-        known_step = settled(place, "step", found.steps, said_step, override=override)
+        known_step = settled(
+            place, "step", found.steps, said_step, override=override, unsure=found.unsure_steps
+        )
     is_known = bool(known_step) and bool(unit or found.units or found.peak_units)
     is_series = table.width == 1 or is_head or (not table.heads and not has_times and is_known)
     index = 0
@@ -418,6 +416,8 @@ def read_table(
     assert known_step is not None
     remarks.append(known_step.remark)
     require_count(place, found.counts, len(samples))
+    if said_step is not None and not found.steps and "step" not in override:
+        _require_durations(place, found.durations, len(samples), said_step)
     lines = [file.lines[k] for k in table.texts]
     return recording_in_si(
         place,
@@ -429,6 +429,16 @@ def read_table(
         tuple(filter(None, remarks)),
         stated=() if "unit" in override else peaks_in_text(lines, own_unit.text),
     )
+
+
+def _require_durations(place: str, durations: Sequence[Stated], count: int, step: Stated) -> None:
+    """Refuse a step that the user says where a head states another duration of so many samples."""
+    for one in durations:
+        steps = one.value / step.value
+        is_alike = abs(steps - count) <= 1 + 0.05 * count
+        cure = 'give the step of the file, or say override = ["step"]'
+        value = f"of a duration of {one}, and {count} samples"
+        require(is_alike, place, value, f"a step of {step}, as is said", cure)
 
 
 def _choose_column(table: _Table, channel: str, *, has_times: bool) -> int:
@@ -480,23 +490,25 @@ def _unit_of(
             another quantity; a unit is not known, or two disagree; or a factor stands beside it.
     """
     file = table.file
-    factor = acceleration_factor(column.unit)
+    factor = factor_of(column.unit, ACCELERATION)
     own = []
-    if factor is not None and column.unit:
+    if factor:
         place = f"line {file.line_number(table.heads[-1])}"
         own.append(Stated(factor, column.unit, place))
     of_heads = TextStatements.of(file, table.heads)
     if not own:
         found.units += of_heads.units
+        found.unsure_units += of_heads.unsure_units
     label = column
     if table.width == 1 and table.titles and not found.units:
         title = file.lines[table.titles[-1]]
         label = _Column.of(title)
         is_unit = "[" in title or "/" in label.unit
-        if label.is_time or not is_unit or acceleration_factor(label.unit) is not None:
+        if label.is_time or not is_unit or factor_of(label.unit, ACCELERATION):
             label = _Column(label.name)
     named = named_quantity(label.name)
-    by_unit = other_quantity(label.unit)
+    parsed = unit_of(label.unit)
+    by_unit = parsed.other_quantity if parsed else ""
     if by_unit:
         by_unit += f" by its unit {label.unit}"
     elsewhere = ""
@@ -513,15 +525,17 @@ def _unit_of(
         raise file.refusal(line, table.file.lines[line], EXPECTED_HEAD, cure)
     if "unit" in override and unit:
         own = own[:1]
-    elif label.unit and acceleration_factor(label.unit) is None and not found.units:
+    elif label.unit and not factor_of(label.unit, ACCELERATION) and not found.units:
         raise table.refusal(f"{label.unit[:40]} is no unit of accelerations: mend the head")
     elif factors := [*found.factors, *of_heads.factors]:
         cure = 'multiply the numbers by it, or say unit and override = ["unit"]'
         text = file.lines[factors[0]].strip()
         raise file.refusal(factors[0], text, "a unit without a factor", cure)
-    said = Stated(acceleration_factor(unit) or 0.0, unit) if unit else None
+    said = Stated(factor_of(unit, ACCELERATION), unit) if unit else None
     stated = [*own, *found.units] or found.peak_units
-    return settled(file.location(table.start), "unit", stated, said, override=override)
+    place = file.location(table.start)
+    unsure = found.unsure_units
+    return settled(place, "unit", stated, said, override=override, unsure=unsure)
 
 
 def _step_of_times(
@@ -544,10 +558,10 @@ def _step_of_times(
     """
     place = table.file.location(table.start)
     time = table.columns[0]
-    factor = seconds_of(time.unit)
+    factor = factor_of(time.unit, "s")
     remarks = []
     if time.unit and not factor:
-        raise table.refusal(f"{time.unit} is no unit of times: {', '.join(SECONDS)}")
+        raise table.refusal(f"{time.unit} is no unit of times, as s, ms or min")
     if not factor:
         unit = settled(place, "unit of times", found.time_units)
         factor = unit.value if unit else 1.0
@@ -604,7 +618,7 @@ def _even_steps(table: _Table, factor: float, stated_step: float | None = None) 
     last_digit = factor * _resolution([cells[0] for cells in table.rows.values()])
     deviations = np.abs(time - even)
     unevenness = float(deviations.max())
-    if stated_step and step == factor and first in (0, factor):
+    if stated_step and step == factor >= MAX_STEP and first in (0, factor):
         remark = "its times count the samples: the stated step is taken"
         return _EvenSteps(stated_step, 0.0, remark, is_stated=True)
     if step > 0 and unevenness <= MAX_UNEVENNESS * step:
@@ -683,16 +697,16 @@ def read_force_history(path: Path) -> ForceHistory:
     if is_headed:
         time, force = table.columns
         is_force = re.match(r"\W*(?:force|load|f)\b", force.name) is not None
-        is_headed = time.is_time and seconds_of(time.unit) > 0 and is_force
-        is_headed = is_headed and (not force.unit or force.unit in NEWTONS)
+        is_headed = time.is_time and factor_of(time.unit, "s") > 0 and is_force
+        is_headed = is_headed and (not force.unit or factor_of(force.unit, FORCE) > 0)
     if not is_headed:
         if table.heads:
             table.numbers(list(table.rows)[:1])  # names a row of another count of cells
         allowed = "time [s],force [kN], or time [s],force of a course without a unit"
-        cure = f"units of forces are {', '.join(NEWTONS)}; masses are no forces"
+        cure = "units of forces are N, kN, MN, kgf, lbf or kip; masses are no forces"
         value = " ".join(file.lines[k] for k in table.texts)[:80] or "without a head"
         raise file.refusal(table.start, value, allowed, cure)
-    steps = _even_steps(table, seconds_of(time.unit))
+    steps = _even_steps(table, factor_of(time.unit, "s"))
     if abs(steps.first) > MAX_UNEVENNESS * steps.step:
         cure = f'write times from 0 s on, and in the case "{file.name}, from {steps.first:g} s"'
         raise file.refusal(first_row, f"time {steps.first:g} s", "even steps from 0 s", cure)
@@ -700,5 +714,7 @@ def read_force_history(path: Path) -> ForceHistory:
     if not forces.any():
         raise file.refusal(table.start, "zeros throughout", "a force that moves something")
     return ForceHistory(
-        steps.step, np.asarray(NEWTONS.get(force.unit, 1.0) * forces), has_unit=bool(force.unit)
+        steps.step,
+        np.asarray((factor_of(force.unit, FORCE) or 1.0) * forces),
+        has_unit=bool(force.unit),
     )

@@ -16,9 +16,9 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, printable, require
 from alphacut.base.memory import require_text
+from alphacut.base.units import ACCELERATION, unit_of
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak, remarks_on_peak
-from alphacut.frame.records.units import acceleration_factor, other_quantity
 
 # A number as C, Python or FORTRAN writes it; D stands for E.
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?")
@@ -246,10 +246,10 @@ def recording_in_si(
         RefusedError: The unit is missing or not one of accelerations, the step is not from 4e-5 s
             to below 0.5 s, or all stated peaks differ by more than a factor of 2.
     """
-    to_si = acceleration_factor(unit)
-    if to_si is None:
+    parsed = unit_of(unit)
+    if parsed is None or parsed.dimension != ACCELERATION:
         value = f"in units of {unit}" if unit else "without a unit"
-        quantity = other_quantity(unit)
+        quantity = parsed.other_quantity if parsed else ""
         cure = "where the file has no unit, say records.unit"
         if quantity:
             cure = f"{unit} is the unit of {quantity}: take the record of the acceleration"
@@ -257,7 +257,7 @@ def recording_in_si(
             cure = "mend the unit in the head"
         raise RefusedError(location, value, f"accelerations in {ACCELERATION_UNITS}", cure)
     require_step(location, step)
-    in_si = to_si * samples
+    in_si = parsed.factor * samples
     remarks += remarks_on_peak(location, in_si, stated, unit, step=step)
     return Recording(file_format, unit, step, in_si, channel, remarks)
 

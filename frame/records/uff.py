@@ -17,11 +17,10 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
-from alphacut.base.stated import METRES
+from alphacut.base.units import factor_of
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated import named_quantity
 from alphacut.frame.records.text_file import NUMBER, choose_channel, decoded, recording_in_si
-from alphacut.frame.records.units import seconds_of
 
 # Codes of the type of values: complex single and complex double.
 COMPLEX = (5, 6)
@@ -91,7 +90,7 @@ def read_uff_record(name: str, content: bytes, channel: str = "", unit: str = ""
     # Line 8 of the head is of the abscissa, and has its name in columns 27 to 46 and its unit in 48
     # to 67. The unit may be the last word of the name; times without a known one are in s.
     words = re.findall(r"[^\W\d_]+", found[chosen].head[7][26:67])
-    step *= next(filter(None, map(seconds_of, reversed(words))), 1.0)
+    step *= next(filter(None, (factor_of(word, "s") for word in reversed(words))), 1.0)
     # Line 9 of the head is of the ordinate and has its unit in columns 48 to 67.
     own_unit = found[chosen].head[8][47:67].strip()
     if own_unit.upper() in ("", "NONE"):
@@ -107,7 +106,7 @@ def _unit_of_system(content: bytes) -> str:
     for system in data_sets(content, 164):
         per_metre = floats(system.head[1])[0]
         for length in ("m", "cm", "mm", "in", "ft"):
-            if isclose(per_metre * METRES[length], 1, rel_tol=1e-3):
+            if isclose(per_metre * factor_of(length, "m"), 1, rel_tol=1e-3):
                 return f"{length}/s^2"
         raise ValueError(f"in a system of {per_metre:g} units of length in a metre")
     return ""

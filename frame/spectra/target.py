@@ -14,7 +14,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.csv_columns import fields, number
 from alphacut.base.errors import path_of, require, require_numbers
 from alphacut.base.number_text import percent_text
-from alphacut.frame.records.units import acceleration_factor
+from alphacut.base.units import ACCELERATION, factor_of
 
 
 class MeanRule(NamedTuple):
@@ -133,13 +133,13 @@ def read_spectrum(path: str | Path, *, damping: float = 0.05) -> TargetSpectrum:
     # The pattern takes the square of the length of a text.
     require(len(text) <= MAX_HEAD, f"{file.name}, head", text[:80], "two names with units")
     match = re.fullmatch(r"[^,]+[\[(]s[\])],[^,]+[\[(]([^,]+)[\])]\s*", text)
-    factor = acceleration_factor(match[1]) if match else None
+    factor = factor_of(match[1], ACCELERATION) if match else 0.0
     allowed = "period [s],acceleration [g] or in another unit"
-    require(factor is not None, f"{file.name}, head", text[:80], allowed)
+    require(factor > 0, f"{file.name}, head", text[:80], allowed)
     for row, cells in rows:
         what, cure = ",".join(cells), "write decimal points"
         require(len(cells) == 2, f"{file.name}, row {row}", what, "two numbers", cure)
     periods = [number(file, row, cells, 0) for row, cells in rows]
     values = [number(file, row, cells, 1) for row, cells in rows]
-    accelerations = np.array(values) * (factor or 1.0)
+    accelerations = np.array(values) * factor
     return TargetSpectrum(np.array(periods), accelerations, name=file.stem, damping=damping)

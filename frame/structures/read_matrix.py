@@ -15,13 +15,16 @@ from pathlib import Path
 
 import numpy as np
 
+from alphacut.base.apart import read_apart
 from alphacut.base.array_files import Numbers, names_in_npz, read_npy, read_npz
 from alphacut.base.arrays import Array
 from alphacut.base.csv_columns import NUMBER
 from alphacut.base.errors import RefusedError, path_of, printable, require
 from alphacut.base.memory import require_free_memory, require_text
 from alphacut.base.stated import Stated, require_overrides, settled, warn_of_overrides
+from alphacut.base.units import FREQUENCY, TRANSFORMED, Mention, mentions, without_units, word_of
 from alphacut.frame.records.stated import FACTOR
+from alphacut.frame.records.text_file import decoded
 from alphacut.frame.structures.entry_lists import (
     NamedMatrix,
     chosen_place,
@@ -42,32 +45,13 @@ ALLOWED = "a file .mtx, .sti, .mas, .pch, .op4, .full, .npz, .npy or .csv of fin
 MAX_ROWS = 5000
 # Abaqus writes 1e36 or more on the diagonal of an unknown that it holds. No spring comes near it.
 HELD_STIFFNESS = 1e35
-_FORCE = r"(?:(?:da|[kMG])?N|lbf?|kips?|kgf|tonf?|dyn)"
-_LENGTH = r"(?:mm|cm|m|in|ft|inch|inches)"
-# A force over a length, as of stiffnesses and dampings, or times a length.
-_QUOTIENT = (
-    rf"(?<![\w./]){_FORCE}\s*(?:\(?[-*·. ]?\s*s(?:\^|\*\*)?[2²]?\)?\s*)?/\s*{_LENGTH}\b"
-    rf"|(?<![\w./]){_FORCE}[-*·. ]{{0,3}}(?:mm|cm|m|ft)\b"
-)
-# Words that are units, or tell that there are none, wherever they stand but behind a number.
-_SURE = (
-    r"(?<![\w./])(?<!\d )(?:tonnes?|tons?|[kMG]Pa|ksi|psi|kips?|inch|inches|pounds?|slugs?|daN"
-    r"|[kMG]N(?!\s*/)|flexibility|normali[sz]ed|dimensionless)\b"
-)
-_BEHIND_IN = rf"\bin\s+({_FORCE}|mm|cm|m|ft|t|tons?|Mg|kg|g)(?![\w./])"
-# Units where a line has the word unit, brackets, or "in" and a number.
-_WORD = rf"(?<![\w./])(?:{_FORCE}|{_LENGTH}|t|tons?|Mg|kg|g|slugs?)(?![\w.])"
+# What stands before the unit of all entries, where that has a number.
+_IN_UNITS = r"(?i)\b(?:in|units?(?:\s+of)?)\W*$|[\[(]\s*$|^\W*$"
 # Words of numbers that are no entries in units of SI, whatever units stand beside them.
 _OTHER_NUMBERS = (
-    r"(?i)\b(?:weights?|invers\w+|inverted|compliance|half|halved|doubled|hundreds|thousands|millions"
-    r"|imperial|cgs|us(?:\s+customary)?\s+units|us\s+customary|ratios?|per\s?cent\w*|relative"
-    r"|toneladas?|log(?:10|arithm\w*))\b|%|/\s*(?:mm|cm|in|inch|ft|foot)\b"
+    r"(?i)\b(?:weights?|compliance|flexibility|half|halved|doubled|twice|imperial|cgs|customary|ratios?"
+    rf"|relative|us\s+units)\b|%|\bper\s?cent|\bmass\w*\s+as\s+forces?|{TRANSFORMED}"
 )
-_SPELLED = {
-    r"kilo[-\s]?newtons?": "kN", r"mega[-\s]?newtons?": "MN", r"\bnewtons?": "N", r"\s+per\s+": "/",
-    r"milli-?met(?:er|re)s?": "mm", r"\bmet(?:er|re)s?": "m",
-    r"\bmetric ton(?:s|nes?)?\b": "tonnes",
-}  # fmt: skip
 
 
 def read_matrix(
@@ -141,48 +125,71 @@ def _stated_factor(path: Path) -> float:
     those of rotations and of displacements differently.
 
     Raises:
-        RefusedError: A comment states other units, or two of different factors.
+        RefusedError: A comment states other units, or two of different factors; or a value beside
+            a unit that may be that of the numbers.
     """
     if path.suffix.lower() not in (".mtx", ".csv", ".pch", ".bdf", ".nas", ".sti", ".mas"):
         return 1.0
     stated = []
-    factors = {"k": 1e3, "M": 1e6, "G": 1e9, "N": 1.0, "t": 1e3}
+    unsure = []
     cure = "write the matrix in N, m, kg, or say override = ['unit'] if the comment is wrong"
     content = path.read_bytes()
     for comment in re.finditer(rb"(?m)(?:^[ \t]*(?:%(?!%MatrixM)|\$|\*\*|//)|#).*$", content):
-        line = comment[0].decode("utf-8", "replace")
+        line = decoded(comment[0]).lstrip(" \t%#$*/")
         row = content.count(b"\n", 0, comment.start()) + 1
         place = f"{path.name}, line {row}"
-        for pattern, symbol in _SPELLED.items():
-            line = re.sub(pattern, symbol, line, flags=re.IGNORECASE)
-        other = re.search(_OTHER_NUMBERS, line.lstrip(" \t%#$*/"))
+        units = mentions(line)
+        rest = without_units(line, units)
+        # "mass = weight / g" is a mass.
+        other = None if re.search(r"(?i)\bmass\w*\s*=", line) else re.search(_OTHER_NUMBERS, rest)
+        is_per_cent = any(one.dimension == "" and one.is_sure for one in units)
         allowed = "entries of stiffness, damping or mass in units"
-        require(other is None, place, line.strip()[:60], allowed, cure)
-        units = [*re.findall(_QUOTIENT, line), *re.findall(_SURE, line)]
-        units += re.findall(_BEHIND_IN, line)
-        if re.search(r"(?i)\bunits?\b|[\[(]|\bin\s+\d", line):
-            units += re.findall(_WORD, line)
-        has_factor = re.search(FACTOR, line, re.IGNORECASE) is not None
-        has_factor = has_factor or re.search(r"\bin\s+\d[\d.]*\s*[a-zA-Z]", line) is not None
-        is_of_numbers = bool(units) or re.search("(?i)scal|multipl|divi", line) is not None
-        require(
-            not (has_factor and is_of_numbers),
-            place,
-            line.strip()[:60],
-            "units without a factor",
-            cure,
+        require(other is None and not is_per_cent, place, line.strip()[:60], allowed, cure)
+        units = [x for x in units if x.is_sure and (not x.numbers or not _is_value_of_another(x))]
+        is_of_numbers = bool(units) or re.search("(?i)scal|multipl|divi", rest) is not None
+        has_factor = is_of_numbers and re.search(FACTOR, rest, re.IGNORECASE) is not None
+        has_factor |= any(
+            one.numbers not in ((), (1.0,)) and re.search(_IN_UNITS, one.before) for one in units
         )
-        for unit in units:
-            text = re.sub(r"\s", "", unit)
-            is_metric = (
-                re.fullmatch(r"[kMG]?N|[kMG]?N(?:.*[^cm])?m|m|kg|t|tonnes?|Mg", text) is not None
-            )
-            require(is_metric, place, f"in {text}", "units of SI, or kN and t with m", cure)
-            if text != "m":
-                value = {"Mg": 1e3, "kg": 1.0}.get(text) or factors[text[0]]
-                stated.append(Stated(value, text, f"line {row}"))
+        require(not has_factor, place, line.strip()[:60], "units without a factor", cure)
+        for one in units:
+            factor = _metric_factor(one)
+            allowed = "units of SI, or kN and t with m"
+            require(factor != 0, place, f"in {one.shown}", allowed, cure)
+            if factor is not None:
+                where = stated if one.numbers in ((), (1.0,)) else unsure
+                where.append(Stated(factor, one.shown, f"line {row}"))
     found = settled(path.name, "unit", stated)
-    return found.value if found else 1.0
+    taken = found or Stated(1.0, "of SI")
+    for one in unsure:
+        settled(path.name, "unit", [one], taken)
+    return taken.value
+
+
+def _is_value_of_another(one: Mention) -> bool:
+    """Return whether a value is that of a length, a mass or a time, and not of the entries."""
+    is_of_another = "m-" in one.dimension or one.dimension in ("m", "kg", "s", "rad", FREQUENCY)
+    return is_of_another and re.search(_IN_UNITS, one.before) is None
+
+
+def _metric_factor(one: Mention) -> float | None:
+    """Return the factor of forces and masses in a unit; 0 of other units than with m and s.
+
+    None stands for a unit that has neither, as m or s.
+    """
+    factor = None
+    for name, power in one.unit.atoms:
+        word = word_of(name)
+        assert word is not None
+        # Masses and forces over a length, an area or a volume are loads, densities or pressures.
+        is_metric = word.factor in (1.0, 1e3, 1e6, 1e9) and "m-" not in one.dimension
+        if "kg" in word.dimension:
+            if not is_metric or power != 1 or factor is not None:
+                return 0.0
+            factor = word.factor
+        elif word.factor != 1 or word.dimension not in ("m", "s", "rad"):
+            return 0.0
+    return factor
 
 
 def read_unknowns(path: str | Path, *, name: str = "", held: bool = False) -> tuple[str, ...]:
@@ -367,47 +374,26 @@ def _read_archive(path: Path, name: str, *, max_rows: int) -> Numbers:
     """
     names = names_in_npz(path)
     if set(names) >= {"format", "shape", "data"}:  # as scipy.sparse.save_npz writes it
-        return _read_sparse(path, max_rows=max_rows)
+        shape = read_npz(path, "shape", kinds="iu")
+        require_size(path.name, tuple(shape.tolist()), max_rows)
+        reader = "alphacut.frame.structures.read_matrix:dense_of_sparse"
+        return read_apart(reader, path, library="SciPy")["matrix"]
     return read_npz(path, names[chosen_place(path.name, names, name)])
 
 
-def _read_sparse(path: Path, *, max_rows: int) -> Array:
-    """Return the matrix in a file of `scipy.sparse.save_npz`, dense, shape (rows, columns).
+def dense_of_sparse(path: Path) -> dict[str, Numbers]:
+    """Return the matrix in a file of `scipy.sparse.save_npz`: the reader that runs apart.
 
-    The file has the arrays "format" (one text: "coo", "csr" or "csc"), "shape" and "data", and two
-    arrays of indices: "row" and "col", or "indptr" and "indices". Entries of one place are added.
-    SciPy's compiled code writes where wrong indices lead, so that they are checked before.
-
-    Args:
-        path: The file.
-        max_rows: Largest number of rows and of columns.
+    SciPy's compiled code writes where wrong indices lead.
 
     Raises:
-        RefusedError: The matrix is larger than allowed or of another format, or its arrays are
-            damaged or contradict one another.
+        Exception: Whatever SciPy raises of arrays that contradict one another.
     """
-    name = path.name
-    letters = read_npz(path, "format", kinds="SU").item()
-    form = letters.decode("latin-1") if isinstance(letters, bytes) else str(letters)
-    shape = read_npz(path, "shape", kinds="iu")
-    require(shape.shape == (2,), name, f"of {shape.size} sides", "rows and columns")
-    n_rows, n_columns = (int(n) for n in shape)
-    require_size(name, (n_rows, n_columns), max_rows)
-    keys = {"coo": ("row", "col"), "csr": ("indptr", "indices"), "csc": ("indptr", "indices")}
-    cure = "save it as scipy.sparse.save_npz(NAME, matrix.tocsr())"
-    require(form in keys, name, f"sparse of form {form}", "csr, csc or coo", cure)
-    values = np.asarray(read_npz(path, "data", kinds="iuf"), float)
-    first, second = (read_npz(path, key, kinds="iu") for key in keys[form])
-    from scipy import sparse  # which other files need not
+    from scipy import sparse
 
-    try:
-        if form == "coo":
-            matrix = sparse.coo_array((values, (first, second)), shape=(n_rows, n_columns))
-        else:
-            made = {"csr": sparse.csr_array, "csc": sparse.csc_array}[form]
-            matrix = made((values, second, first), shape=(n_rows, n_columns))
-            matrix.check_format(full_check=True)
-    except ValueError as error:
-        raise RefusedError(name, str(error)[:80], ALLOWED, "save the matrix anew") from None
-    require(matrix.nnz == values.size, name, "of unused entries", ALLOWED, "save the matrix anew")
-    return np.asarray(matrix.toarray())
+    matrix = sparse.load_npz(path)
+    if matrix.format in ("csr", "csc"):
+        matrix.check_format(full_check=True)
+        if matrix.data.size != matrix.nnz:
+            raise ValueError("unused entries")
+    return {"matrix": matrix.toarray()}

@@ -176,7 +176,7 @@ def read_head(path: Path, sides: Sequence[float], override: Collection[str] = ()
         "elementdatafile",
         "data file",
     )
-    texts = [f"{key} {value}" for key, value in entries.values.items() if key not in known]
+    texts = [f"{key}: {value}" for key, value in entries.values.items() if key not in known]
     if not any(units):
         ordered = [unit_in_texts(texts)] * 3
     counts = [int(sizes[axis]) for axis in order]
@@ -276,9 +276,13 @@ class _Entries:
         for row, line in enumerate(lines, 1):
             size += len(line)
             key, *value = re.split(r":=|[=:]", _decoded(line).strip(), maxsplit=1)
-            values[key.strip().lower()] = "".join(value).strip()
-            is_list = values[key.strip().lower()].startswith("LIST")
-            if key.strip() in ("", "ElementDataFile") or is_list:  # raw data may follow
+            text = "".join(value).strip()
+            name = key.strip().lower()
+            if name.startswith(("#", "comment")) and name in values:
+                text = f"{values[name]}; {text}"
+            values[name] = text
+            is_list = text.startswith("LIST")
+            if name in ("", "elementdatafile") or is_list:  # raw data may follow
                 listed = [text.decode("latin-1").strip() for text in lines[row:]] if is_list else []
                 return cls(values, size, tuple(filter(None, listed)))
         is_whole = len(start) < longest_head

@@ -5,39 +5,29 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 from alphacut.base.errors import require
-from alphacut.base.stated import LENGTHS, METRES, Stated, settled
+from alphacut.base.stated import LENGTHS, Stated, settled
+from alphacut.base.units import NUMBER, Mention, factor_of, mentions, without_units
 
-_UNITS = "|".join(sorted(METRES, key=len, reverse=True))
-_NUMBER = r"(\d+\.?\d*(?:e[-+]?\d+)?|\.\d+)"
-# Sides of voxels, as "voxel size 2 x 2 x 5 um", "pixel: 2 um" or "slice thickness = 5 um".
+VOLUME = 3
+# Words of sides of voxels, of sides along z, of pixels, which lie in a slice, of whole volumes, and
+# of lengths that are none of these.
 _SIDES = (
-    r"(slice|layer|section|\bz)?s?[\s_-]*(vox|pix|px|edge|sampling|scale|spac|resol|thick|isotrop|every|step)"
-    rf"(?:(?!slice|layer|section|\bz\b)[^\d\n]){{0,40}}{_NUMBER}"
-    rf"(?:\s*(?:[x×,;*]|\s)\s*{_NUMBER}\s*[x×,;*\s]\s*{_NUMBER})?\s*[\[(]?({_UNITS})(?![a-z])"
+    r"(?i)vox|pix|px|edge|sampling|scale|spac|resol|thick|isotrop|every|step|pitch|kante|schicht"
 )
-# The side along one axis, as "dx=2um" or "x: 2 um", and the extent of the whole volume.
-_AXIS = (
-    r"(?:(?:^d?|\bd)([xyz])[\"']?[\s:=]+|\b([xyz])[\"']?\s*[:=]\s*)"
-    rf"{_NUMBER}\s*({_UNITS})?(?![a-z])"
+_ALONG_Z = r"(?i)slice|layer|section|slab|voxel\W*depth|schicht|tranche|\bz\b"
+_PIXEL = r"(?i)pix|px"
+_EXTENT = r"(?i)field\s+of\s+view|\bfov|extent"
+_OTHERS = (
+    r"(?i)diamet|wavelength|source|detector|distance|sample(?!d)|specimen|fib(?:re|er)|grain|particle"
+    r"|pore|radius|filter|aperture|focal|origin|offset|position|corner|cent(?:re|er)"
+    r"|crop|wall|core\b|spot|stage"
 )
-_EXTENT = (
-    rf"(?:field\s+of\s+view|\bfov|\bextents?)[^\d\n]{{0,20}}{_NUMBER}"
-    rf"(?:[\sx×,;*]+{_NUMBER}[\sx×,;*]+{_NUMBER})?\s*({_UNITS})(?![a-z])"
-)
-_REWRITTEN = {
-    # One unit behind each number, as "2um;2um;5um".
-    rf"{_NUMBER}\s*({_UNITS})([\s,;x×*]+){_NUMBER}\s*\2([\s,;x×*]+){_NUMBER}\s*\2(?![a-z])": (
-        r"\1 \4 \6 \2"
-    ),
-    # "2 um/pixel", and the unit before the numbers: "spacing (um): 2 2 5", "voxel_um: [2, 2, 5]".
-    rf"({_NUMBER}\s*(?:{_UNITS}))\s*(?:/|per)\s*(vox|pix)\w*": r"\3: \1",
-    rf"[\[(_]({_UNITS})[\])\"']*\s*[:=]*\s*[\[(]*({_NUMBER}(?:[\s,;x×*]+{_NUMBER}){{0,2}})": (
-        r" \2 \1"
-    ),
-    r"vox(?:el)?[\s_]*depth": "slice spacing",
-}
+_AXIS = r"(?i)(?:(?:^|\W)d?|\bd)([xyz])[\"']?\s*[:=]*\s*$"
+# A number of one axis without a unit.
+_BARE_AXIS = rf"(?i)\bd?([xyz])[\"']?\s*[:=]\s*({NUMBER})(?!\s*[a-zµμ])"
 
 
 def require_spacing(
@@ -73,13 +63,13 @@ def require_spacing(
         return
     # The case's sides are those of the array's axes (z, y, x), a file states x, y, z.
     expected = list(reversed(sides))
-    units = [unit.strip().lower() for unit in units] or [""] * len(stated)
+    units = [unit.strip() for unit in units] or [""] * len(stated)
     shown = " × ".join(f"{x:g} {u}".strip() for x, u in zip(stated, units, strict=True))
     known = [k for k, length in enumerate(stated) if not math.isnan(length)]
     are_lengths = all(0 < stated[k] < math.inf for k in known)
     require(are_lengths, name, f"voxels of {shown}", "spacings greater than 0, or none")
     # Without a known unit the ratios of the sides count: of all axes in the unit of the first one.
-    factors = [METRES.get(unit, math.nan) for unit in units]
+    factors = [factor_of(unit, "m") or math.nan for unit in units]
     if all(math.isnan(factors[k]) for k in known):
         is_one = len({units[k] for k in known}) < 2
         require(is_one, name, f"voxels of {shown}", f"units {LENGTHS}")
@@ -91,55 +81,114 @@ def require_spacing(
     are_alike = all(math.isclose(stated[k] * factors[k], expected[k], rel_tol=0.01) for k in known)
     cure = "give the voxel as it is"
     require(are_alike, name, f"voxels of {shown} along x, y, z", shown_sides, cure)
-    for text in texts:
-        for pattern, written in _REWRITTEN.items():
-            text = re.sub(pattern, written, text, flags=re.IGNORECASE)
-        for axis, own in _sides_in(text, counts):
+    found = [one for text in texts for one in _lengths_in(text, counts)]
+    has_depth = any(one.axes == (2,) for one in found)
+    unsure = [one.stated for one in found if not one.axes]
+    for one in found:
+        # Beside the distance of slices the side of a voxel is that within a slice.
+        axes = one.axes[:2] if has_depth and len(one.axes) == 3 else one.axes
+        for axis in axes:
             if axis < len(expected):
                 said = Stated(expected[axis], f"of {expected[axis]:g} m along {'xyz'[axis]}")
-                settled(name, "voxel", [own], said, tolerance=0.01)
+                settled(name, "voxel", [one.stated], said, tolerance=0.01)
+            elif axis == VOLUME:
+                said = Stated(math.prod(expected), f"of {math.prod(expected):g} m^3")
+                settled(name, "voxel", [one.stated], said, tolerance=0.03)
+    if not unsure or known or len(unsure) < len(found):
+        return
+    # Lengths of which no word says what they are must be those of the case, or of the volume.
+    extents = [side * count for side, count in zip(expected, counts, strict=False)]
+    lengths = [Stated(length, f"of {length:g} m") for length in (*expected, *extents)]
+    for own in unsure:
+        settled(name, "voxel", [], own, tolerance=0.01, unsure=lengths)
+    for axis, said in enumerate(lengths[: len(expected)]):
+        whole = extents[axis] if extents else math.nan
+        if not any(math.isclose(x.value, whole, rel_tol=0.01) for x in unsure):
+            settled(name, "voxel", [], said, tolerance=0.01, unsure=unsure)
 
 
-def _sides_in(text: str, counts: Sequence[int]) -> Iterator[tuple[int, Stated]]:
-    """Yield the sides of voxels in a line of text, each with its axis: 0, 1, 2 of x, y, z.
+class _Length(NamedTuple):
+    """A length that a text states, and the axes, 0, 1, 2 of x, y, z, of which it is the side.
+
+    Without axes it may be something else. The axis `VOLUME` stands for the volume of a voxel.
+    """
+
+    axes: tuple[int, ...]
+    stated: Stated
+
+
+def _lengths_in(text: str, counts: Sequence[int]) -> Iterator[_Length]:
+    """Yield the lengths in a line of text that are, or may be, sides of voxels.
 
     Args:
-        text: The line, in which `_REWRITTEN` is rewritten.
+        text: The line.
         counts: Numbers of voxels along x, y, z, which divide extents; none if unknown.
     """
-    # Voxels in a length, as "500 px/mm" or "12700 dpi".
-    per_length = rf"{_NUMBER}\s*(?:(vox|pix|px)\w*\s*(?:/|per)\s*({_UNITS})(?![a-z])|[dp]pi\b)"
-    for match in re.finditer(per_length, text, re.IGNORECASE):
-        side = METRES[(match[3] or "inch").lower()] / (float(match[1]) or math.nan)
-        n_axes = 3 if match[2] == "vox" else 2  # a pixel lies in a slice
-        yield from ((axis, Stated(side, match[0])) for axis in range(n_axes))
-    for match in re.finditer(_SIDES, text, re.IGNORECASE):
-        axis_word, what, first, second, third, unit = match.groups()
-        # Slices lie along z, and a pixel lies in a slice.
-        is_of_pixel = axis_word is None and what.lower() in ("pix", "px") and third is None
-        for axis, length in enumerate((first, second or first, third or first)):
-            if not (axis_word and axis < 2) and not (is_of_pixel and axis == 2):
-                yield axis, Stated(METRES[unit.lower()] * float(length), match[0])
-    if not re.search("(?i)origin|offset|position|corner|centre|center", text):
-        for match in re.finditer(_AXIS, text, re.IGNORECASE):
-            unit = match[4] or unit_in_texts([text])
-            if unit:
-                axis = "xyz".index((match[1] or match[2]).lower())
-                yield axis, Stated(METRES[unit.lower()] * float(match[3]), match[0])
-    for match in re.finditer(_EXTENT, text, re.IGNORECASE):
-        lengths = (match[1], match[2] or match[1], match[3] or match[1])
+    found = mentions(text)
+    unit = unit_in_texts([text])
+    if unit and not re.search(_OTHERS, text):
+        for match in re.finditer(_BARE_AXIS, without_units(text, found)):
+            side = Stated(factor_of(unit, "m") * float(match[2]), match[0])
+            yield _Length(("xyz".index(match[1].lower()),), side)
+    groups: list[list[Mention]] = []
+    for one in found:
+        # Numbers with a unit each, as "2um;2um;5um", are those of one axis after another.
+        if groups and len(one.numbers) == 1 and re.fullmatch(r"[\s,;x×*()]+", one.before):
+            groups[-1].append(one)
+        elif one.numbers:
+            groups.append([one])
+    for group in groups:
+        first = group[0]
+        if first.dimension in ("m-1 pixel", "m-1 voxel", "m pixel-1", "m voxel-1"):
+            side = (first.values[0] or math.nan) ** (-1 if "m-1" in first.dimension else 1)
+            axes = (0, 1, 2) if "voxel" in first.dimension else (0, 1)
+            yield _Length(axes, Stated(side, first.shown))
+        elif first.dimension == "m3" and len(first.numbers) == 1 and "vox" in first.before.lower():
+            yield _Length((VOLUME,), Stated(first.values[0], first.shown))
+        elif first.dimension == "m" or (first.dimension == "m3" and len(first.numbers) == 3):
+            scale = first.unit.factor ** (1 if first.dimension == "m" else 1 / 3)
+            lengths = [scale * number for one in group for number in one.numbers]
+            yield from _sides_of(first.before, group[-1].behind, lengths, counts, first.shown)
+
+
+def _sides_of(
+    before: str, behind: str, lengths: Sequence[float], counts: Sequence[int], shown: str
+) -> Iterator[_Length]:
+    """Yield what one or several lengths beside each other are, by the words around them."""
+    around = f"{before[-60:]} | {re.split('[,;]', behind)[0][:25]}"
+    is_side = re.search(_SIDES, around) is not None
+    axes: tuple[int, ...] = ()
+    if re.search(_EXTENT, around):
         # A single extent is that of the width.
-        for axis, count in enumerate(counts if match[3] else counts[:1]):
-            length = METRES[match[4].lower()] * float(lengths[axis]) / count
-            yield axis, Stated(length, match[0])
+        for axis, (length, count) in enumerate(zip(lengths, counts, strict=False)):
+            yield _Length((axis,), Stated(length / count, f"{shown} of {count} voxels"))
+        return
+    if re.search(_OTHERS, around) and not is_side:
+        return
+    if len(lengths) == 3 and is_side:
+        for axis, length in enumerate(lengths):
+            yield _Length((axis,), Stated(length, shown))
+        return
+    if len(lengths) == 1:
+        if match := re.search(_AXIS, before):
+            axes = ("xyz".index(match[1].lower()),)
+        elif re.search(_ALONG_Z, around):
+            axes = (2,)
+        elif re.search(_PIXEL, before):
+            axes = (0, 1)
+        elif is_side:
+            axes = (0, 1, 2)
+    for length in lengths:
+        yield _Length(axes, Stated(length, shown))
 
 
 def unit_in_texts(texts: Iterable[str]) -> str:
     """Return the unit of all lengths that lines state, as "lengths in um"; empty if none does."""
+    announced = re.compile(r"(?i)\bin\W*$|unit")
     for text in texts:
-        pattern = rf"(?:\bin|units?[\s\"']*[:=]*(?:\s*(?:are|is|of))?)\s*[\[(\"]?({_UNITS})\b"
-        if match := re.search(pattern, text, re.IGNORECASE):
-            return match[1]
+        for one in mentions(text):
+            if one.dimension == "m" and not one.numbers and announced.search(one.before):
+                return one.text
     return ""
 
 

@@ -69,7 +69,9 @@ def read_msh(content: bytes) -> MshFile:
             raise ModuleNotFoundError(name="gmsh")
     with TemporaryDirectory(prefix="alphacut-") as folder:
         path = Path(folder, "mesh.msh")
-        path.write_bytes(re.sub(rb"(?s)\$Periodic\s.*?\$EndPeriodic\s*", b"", content))
+        # Results on nodes and elements, which some versions of Gmsh refuse, are not needed.
+        others = rb"(?s)\$(Periodic|\w*Data|InterpolationScheme|Comments)\s.*?\$End\1\s*"
+        path.write_bytes(re.sub(others, b"", content))
         from alphacut.base.apart import read_apart  # which a cell without a file needs not
 
         read = read_apart("alphacut.rve.mesh.msh:arrays_of_gmsh", path, library="Gmsh")

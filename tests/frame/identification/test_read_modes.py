@@ -136,6 +136,13 @@ def test_other_arguments_are_refused(tmp_path, name, options, key):
         ("# unit: Hz (sample rate 200 Hz)\nmode,frequency,q1,q2", "", 1),
         ("# unit: Hz (sample rate 200 Hz)\nmode,frequency,q1,q2", "kHz", None),
         ("# lambda = omega^2\nmode,frequency,q1,q2", "Hz", None),
+        ("mode;frequency / Hz;q1;q2", "", 1),
+        ("mode,frequency,q1,q2\n-,kHz,-,-", "", 1000),
+        ("# Abtastfrequenz 200 Hz, Eigenfrequenzen in Hz\nmode,frequency,q1,q2", "", 1),
+        ("# first at 1.5 Hz\nmode,frequency,q1,q2", "Hz", 1),
+        ("# tenths of Hz\nmode,frequency,q1,q2", "", None),
+        ("# percent of 10 Hz\nmode,frequency,q1,q2", "Hz", None),
+        ("# first at 1.5 Hz\nmode,frequency,q1,q2", "kHz", None),
     ],
 )
 def test_the_unit_of_frequencies_is_stated_or_asked_for(tmp_path, head, unit, factor):

@@ -127,6 +127,9 @@ def test_statements_are_settled_by_one_rule():
         with refuses("f"):
             settled("f", "unit", stated, said)
     assert settled("f", "step", [Stated(0.0049, "")], Stated(0.005, ""), tolerance=0.05)
+    assert settled("f", "unit", [], g, unsure=[gal, g]) == g
+    with refuses("f"):
+        settled("f", "unit", [], g, unsure=[gal])
 
 
 COLUMN = 1
@@ -231,6 +234,11 @@ HEADS = [
     ("values are fractions of g_n, dt = 0.01\n", COLUMN, 0.01, G),
     ("jerk (m/s^3)\ndt 0.01\n", COLUMN, 0.01, None),
     ("angular acceleration [rad/s^2], dt 0.01 s\n", COLUMN, 0.01, None),
+    ("ground acceleration, g/100, dt 0.01 s\n", COLUMN, 0.01, None),
+    ("normalised to 1 g, dt 0.01\n", COLUMN, 0.01, None),
+    ("motion squared, gal^2, dt .01 s\n", COLUMN, 0.01, None),
+    ("micrometers per second squared; 0.01-s intervals\n", COLUMN, 0.01, 1e-6),
+    ("<record dt_ms=10 unit=gal>\n", COLUMN, 0.01, 0.01),
 ]
 """Heads with the layout of the numbers, their step in s, and their unit in m/s²; None of others."""
 
@@ -257,3 +265,33 @@ def test_heads_of_many_kinds_are_read_as_they_state_or_refused(
     other = "gal" if factor > 0.5 else "g"
     with pytest.raises(RefusedError, match="of unit"):
         read_record(path, **asked | {"unit": other})
+
+
+@pytest.mark.parametrize(
+    ("head", "step"),
+    [
+        ("Nyquist 50 Hz\nacc in gal\n", 0.01),
+        ("gal, one value in 10 ms\n", 0.01),
+        ("Duration 0.6 s, gal\n", 0.01),
+        ("Filter: Butterworth 0.1-25 Hz\nacc in gal\n", None),
+        ("Peak 12.5 gal at 0.05 s\nacc in gal\n", None),
+    ],
+)
+def test_a_step_that_is_said_is_compared_with_times_of_unknown_meaning(tmp_path, head, step):
+    path = saved(tmp_path, head, COLUMN)
+    with pytest.raises(RefusedError, match=r"say records\.step"):
+        read_record(path)
+    assert read_record(path, step=step or 0.02).samples == pytest.approx(0.01 * VALUES)
+    if step is not None:
+        with pytest.raises(RefusedError, match=r'override = \["step"\]'):
+            read_record(path, step=2 * step)
+        assert read_record(path, step=2 * step, override=["step"]).step == 2 * step
+
+
+def test_a_unit_that_is_said_is_compared_with_a_letter_that_may_be_one(tmp_path):
+    path = saved(tmp_path, "station x, g\ndt = 0.01 s\n", COLUMN)
+    with pytest.raises(RefusedError, match=r"say records\.unit"):
+        read_record(path)
+    assert read_record(path, unit="g").samples == pytest.approx(G * VALUES)
+    with pytest.raises(RefusedError, match=r'override = \["unit"\]'):
+        read_record(path, unit="gal")

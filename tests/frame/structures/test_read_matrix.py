@@ -255,6 +255,12 @@ def test_an_archive_that_unpacks_to_more_than_memory_is_refused(tmp_path, monkey
         ("compliance", None),
         ("damping ratio in %", None),
         ("masses, metric tons", 1e3),
+        ("mass = weight / g", 1.0),
+        ("masses of 3 storeys of 12 t each, span 4 m, kN", 1e3),
+        ("columns of 2000 kN/m", None),
+        ("square root of K", None),
+        ("loads in t/m", None),
+        ("E=30 GPa, h=3 m, density 7850 kg/m3, kN", 1e3),
     ],
 )
 @pytest.mark.parametrize("name", ["k.csv", "k.mtx", "job.mtx"])
