@@ -9,10 +9,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.linalg import eigh, expm
+from scipy.linalg import eigh
 
 from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame, UnprovedError
-from alphacut.frame.bounds.box import over_box, sources
+from alphacut.frame.bounds.box import over_box
 from alphacut.frame.bounds.level import LevelModels, OutputBounds
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.modes.blocks import (
@@ -29,8 +29,6 @@ from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
 from alphacut.frame.modes.intervening import (
     BlockParticipation,
     Excitation,
-    oscillators,
-    source_patterns,
 )
 from alphacut.frame.modes.structure import classical_structure
 from alphacut.frame.modes.truncated_modes import (
@@ -212,76 +210,6 @@ def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
     assert (off > TIGHT * stray).any()
 
 
-def free_motion(K, ratio, q0, v0, time):
-    """Motion of M = I with one damping ratio from an initial state, shape (T, n)."""
-    n = len(K)
-    squared, shape = np.linalg.eigh(K)
-    damping = shape @ np.diag(2 * ratio * np.sqrt(squared)) @ shape.T
-    A = np.block([[np.zeros((n, n)), np.eye(n)], [-K, -damping]])
-    return np.array([(expm(A * t) @ np.append(q0, v0))[:n] for t in time])
-
-
-def crossing_pair(widths, ratio, source, read=0):
-    """Two alike masses with a spring between them: one is read, the second set in motion."""
-    springs = [np.diag([1.0, 0]), np.diag([0, 1.0]), np.array([[0, 1.0], [1, 0]])]
-    own = matrices(
-        list(zip("abc", springs, strict=True)),
-        {"a": 100.0, "b": 100.0, "c": 0.0},
-        {"q": np.eye(2)[read]},
-        **{"q0" if source == "start" else "v0": np.array([0, 1.0])},
-        ratios=(ratio,),
-    )
-    return own, over(own, dict(zip("abc", widths, strict=True)))
-
-
-def coupled(own, structure, time):
-    """The only block of a structure: its oscillators and the bounds of what couples them."""
-    middle, used = centred_matrices(structure.mass, structure.stiffness)
-    found = enclose_subspaces(middle, used, 2)
-    excitation = Excitation(time, sources(own, structure))
-    to_modal = np.linalg.inv(middle.basis)
-    patterns = source_patterns(structure, excitation.sources) @ to_modal.T
-    rows = structure.initial_state.like(structure.output_rows) @ middle.basis
-    of_block = BlockParticipation.from_block(found.blocks[0], rows, patterns, used)
-    bounds = coupling_bounds(structure, of_block, found, excitation)
-    single = oscillators(structure, of_block, found)
-    return single, bounds.at_nodes[:, 0], bounds.interpolation_error[:, 0]
-
-
-NARROW, WIDE = (1.0, 1.0, 0.2), (12.0, 12.0, 10.0)
-
-
-@pytest.mark.parametrize(
-    ("ratio", "source", "widths", "read"),
-    [
-        (0.02, "velocity", NARROW, 0),
-        (0.02, "start", NARROW, 0),
-        (0.3, "velocity", NARROW, 0),
-        (0.3, "start", NARROW, 0),
-    ],
-)
-def test_what_couples_a_block_holds_and_half_would_not_do(ratio, source, widths, read):
-    time = np.linspace(0, {0.3: 1, 0.02: 4}[ratio], 81)
-    own, (structure, centre, radius) = crossing_pair(widths, ratio, source, read)
-    single, added, _ = coupled(own, structure, time)
-    assert len(single) == 2
-    reached = np.zeros(len(time))
-    for u in (np.array([0, 0, 1.0]), *draws(3, 8)):
-        K, _ = pencil(own, "abc", centre + radius * u)
-        q0, v0 = (np.zeros(2) if x is None else x for x in (own.q0, own.v0))
-        total = free_motion(K, ratio, q0, v0, time)[:, read]
-        for mode in single:
-            omega, decay = (float(x.at(u[None])[0]) for x in (mode.omega, mode.decay))
-            wave = np.sin(omega * time)
-            wave = (
-                np.cos(omega * time) + decay * wave / omega if source == "start" else wave / omega
-            )
-            total = total - mode.participation.at(u[None])[0, 0, 0] * np.exp(-decay * time) * wave
-        assert (np.abs(total) <= added + 1e-9).all()
-        reached = np.maximum(reached, np.abs(total))
-    assert (reached[1:] > (TIGHT if ratio < 0.1 else 0.3) * added[1:])[-40:].any()
-
-
 @pytest.mark.parametrize(
     ("source", "quotient", "share"),
     [("start", 15.0, 0.8), ("start", 0.05, 0.9), ("load", 0.3, 0.8)],
@@ -298,25 +226,6 @@ def test_no_response_falls_faster_with_its_eigenvalue(source, quotient, share):
     bound = response_slopes(moved, np.abs(rho[1]), time * np.abs(rho[1]), omega, quotient)
     reached = np.abs(e[2] - e[0]) / (2 * h) / bound
     assert share < reached.max() <= 1 + 1e-6
-
-
-def test_a_block_strays_from_lines_between_nodes_as_far_as_stated():
-    """Both masses exchange all their motion, of which the oscillators have no share.
-
-    Half of what is stated is for a share of theirs that could move against it.
-    """
-    time, parts = np.linspace(0, 4, 81), 10
-    own, (structure, centre, radius) = crossing_pair(WIDE, 0.002, "velocity")
-    single, _, deviation = coupled(own, structure, time)
-    assert max(mode.participation.magnitude().max() for mode in single) < 1e-12
-    fine, reached = np.linspace(0, 4, 80 * parts + 1), np.zeros(80)
-    for u in (np.array([0, 0, 1.0]), *draws(3, 4)):
-        K, _ = pencil(own, "abc", centre + radius * u)
-        motion = free_motion(K, 0.002, np.zeros(2), np.array([0, 1.0]), fine)[:, 0]
-        off = np.abs(motion - np.interp(fine, time, motion[::parts]))[1:].reshape(80, parts).max(1)
-        assert (off <= deviation[1:] + 1e-12).all()
-        reached = np.maximum(reached, off)
-    assert (reached > TIGHT * deviation[1:] / 2).any()
 
 
 RECORD = Accelerogram(0.02, np.sin(np.arange(150) * 0.21) * np.sin(np.arange(150) * 0.047))
