@@ -16,8 +16,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.modes.classical_modes import classical_modes
-from alphacut.frame.modes.damped_modes import damped_modes
-from alphacut.frame.modes.intervening import Excitation
+from alphacut.frame.modes.modes import Excitation, damped_modes
 from alphacut.frame.modes.point_modes import PointModes
 from alphacut.frame.modes.structure import (
     ClassicalStructure,

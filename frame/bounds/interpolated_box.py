@@ -40,7 +40,7 @@ from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.integrators import SAME
 from alphacut.frame.dynamics.yielding import YieldingFlow
-from alphacut.frame.modes.geometric_mean import geometric_mean
+from alphacut.frame.modes.damped import geometric_mean
 from alphacut.frame.records.history import History
 from alphacut.frame.structures.linear import Assembly, histories, undamped_modes
 from alphacut.frame.structures.storey import MOMENT

@@ -19,8 +19,7 @@ from alphacut.frame.bounds.dual_function import DualFunctionData, require_in_ran
 from alphacut.frame.bounds.node_bounds import Effort, bound_nodes
 from alphacut.frame.calculus.monomials import monomials
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
-from alphacut.frame.modes.intervening import Oscillator
-from alphacut.frame.modes.modes import Modes
+from alphacut.frame.modes.modes import Modes, Oscillator
 from alphacut.frame.response.oscillators import (
     Grid,
     ModalResponses,

@@ -5,7 +5,7 @@
    give the modal model q(t; p) = 2 Re Σ_k C_k exp(λ_k t), and likewise the response to a record
    (`frame.modes.damped`).
 2. The residual of these polynomials in the equations of motion is bounded over the whole box, and
-   with it the error of the response (`frame.modes.model_error`). The degree rises until the error
+   with it the error of the response (`frame.modes.modal_model`). The degree rises until the error
    takes a fifth of the wanted gap. If it does not fall that far, the box is bisected
    (`frame.bounds.spatial_branch_and_bound`).
 3. Branch and bound encloses the extreme values of the model at all nodes, for all outputs, sides
@@ -26,8 +26,12 @@ from alphacut.base.errors import checked_number
 from alphacut.base.progress_bar import Progress
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds, Goal
-from alphacut.frame.bounds.branch_and_bound import Optima, bound_problems, first_optima
-from alphacut.frame.bounds.remainders import remainder_bounds
+from alphacut.frame.bounds.branch_and_bound import (
+    Optima,
+    bound_problems,
+    first_optima,
+    remainder_bounds,
+)
 from alphacut.frame.bounds.spatial_branch_and_bound import halvings, prove
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, MAX_PARAMETERS, Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -35,9 +39,8 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.methods.yielding_proof import YIELDING_GAP, prove_yielding
 from alphacut.frame.modes.damped import require_dissipation
-from alphacut.frame.modes.damped_modes import FittedModel, as_oscillators, fitted_model
-from alphacut.frame.modes.modal_model import ModalModel
-from alphacut.frame.modes.model_error import error_fractions
+from alphacut.frame.modes.modal_model import ModalModel, error_fractions
+from alphacut.frame.modes.modes import FittedModel, as_oscillators, fitted_model
 from alphacut.frame.result import Envelope
 from alphacut.frame.threshold import Threshold
 from alphacut.frame.verification.rounding import rounding_margin

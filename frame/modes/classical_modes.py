@@ -10,20 +10,17 @@ from alphacut.base.arrays import Array
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import CentredMatrices
-from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
-from alphacut.frame.modes.intervening import (
+from alphacut.frame.modes.clusters import (
     BlockParticipation,
-    Excitation,
-    Oscillator,
+    centred_matrices,
+    enclose_subspaces,
     oscillators,
     source_patterns,
 )
-from alphacut.frame.modes.modes import Modes
+from alphacut.frame.modes.modes import Excitation, Modes, Oscillator, TruncatedModes, feedthroughs
 from alphacut.frame.modes.structure import ClassicalStructure
 from alphacut.frame.modes.truncated_modes import (
-    TruncatedModes,
     coupling_bounds,
-    feedthroughs,
     modal_sums_of_block,
     response_of_truncated_modes,
     truncated_modes,

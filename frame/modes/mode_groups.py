@@ -16,14 +16,10 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.frame.calculus.taylor_model import TaylorModel, solve
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
-from alphacut.frame.modes.intervening import BlockParticipation, Ends
+from alphacut.frame.modes.clusters import BlockParticipation, centred_matrices, enclose_subspaces
+from alphacut.frame.modes.modes import Ends
 from alphacut.frame.modes.structure import with_classical_damping
-from alphacut.frame.modes.truncated_modes import (
-    ModalSums,
-    modal_sums_of_block,
-    sums_over_all_modes,
-)
+from alphacut.frame.modes.truncated_modes import ModalSums, modal_sums_of_block, sums_over_all_modes
 from alphacut.frame.structures.linear import LinearSystem, stack
 
 

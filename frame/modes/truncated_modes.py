@@ -24,25 +24,22 @@ F_j| sup |de/dλ|. With δ = ‖N − 1‖₂ < 1 the eigenvalues of N lie in [1
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.base.arrays import Array, Ints
+from alphacut.base.arrays import Array
 from alphacut.frame.calculus.taylor_model import TaylorModel, solution_series, solve
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.modes.clusters import Subspaces
-from alphacut.frame.modes.intervening import (
+from alphacut.frame.modes.clusters import (
     BlockParticipation,
     DampedRanges,
-    Excitation,
+    Subspaces,
     column_products,
     damped_ranges,
 )
+from alphacut.frame.modes.modes import Excitation, TruncatedModes
 from alphacut.frame.modes.structure import ClassicalStructure
-from alphacut.frame.records.history import History
-from alphacut.frame.response.chord_deviation import load_deviation
 from alphacut.frame.response.oscillators import (
     Oscillators,
     Ranges,
@@ -50,54 +47,6 @@ from alphacut.frame.response.oscillators import (
     grid_over,
     response_ranges,
 )
-
-
-@dataclass(frozen=True, eq=False)
-class TruncatedModes:
-    """Response of modes that are known by sums: C m(t) ± R r(t) for each source and output."""
-
-    participation: TaylorModel  # C, (sources, m)
-    amplitude: TaylorModel  # R, (sources, m)
-    response_midpoint: Array  # m, (sources, m, T)
-    response_radius: Array  # r, (sources, m, T)
-    # bound of the distance of the response from straight lines between nodes, (T, m)
-    interpolation_error: Array
-
-    def at(self, nodes: Ints | slice, outputs: Ints | slice) -> TruncatedModes:
-        """Return the response at some nodes and for some outputs."""
-        return TruncatedModes(
-            participation=self.participation[:, outputs],
-            amplitude=self.amplitude[:, outputs],
-            response_midpoint=self.response_midpoint[:, outputs][..., nodes],
-            response_radius=self.response_radius[:, outputs][..., nodes],
-            interpolation_error=self.interpolation_error[nodes][:, outputs],
-        )
-
-    @property
-    def radius(self) -> Array:
-        """Bound of Σ R r over the sources, each at the node where it is largest, shape (m,)."""
-        products = self.amplitude.magnitude()[..., np.newaxis] * self.response_radius
-        return np.asarray(products.max(axis=-1).sum(axis=0))
-
-
-def feedthroughs(factors: TaylorModel, histories: Sequence[History], time: Array) -> TruncatedModes:
-    """Return what forces add to accelerations at once as a sum of known responses f(t).
-
-    Args:
-        factors: What a unit of each force adds to the m outputs, shape (forces, m).
-        histories: The forces f over time.
-        time: T time nodes, in s.
-    """
-    values = np.stack([history.values(time) for history in histories])
-    deviations = np.stack([load_deviation(history, time) for history in histories])
-    response = np.repeat(values[:, np.newaxis], factors.remainder.shape[1], axis=1)
-    return TruncatedModes(
-        participation=factors,
-        amplitude=factors * 0.0,
-        response_midpoint=response,
-        response_radius=0.0 * response,
-        interpolation_error=deviations.T @ factors.magnitude(),
-    )
 
 
 class ModalSums(NamedTuple):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Accelerogram, DualProof, Proof, StoreyFrame, envelope, numbers
-from alphacut.frame.modes.damped_modes import fitted_model
+from alphacut.frame.modes.modes import fitted_model
 from alphacut.fuzzy import Interval
 from tests.frame.motions import exact_motions, random_points, require_inside
 

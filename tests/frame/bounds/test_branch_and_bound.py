@@ -34,6 +34,8 @@ from alphacut.frame.bounds.branch_and_bound import (
     Piece,
     bound_problems,
     examine_items,
+    majorant_parts,
+    remainder_bounds,
 )
 from alphacut.frame.bounds.kernel import (
     BoxTables,
@@ -42,15 +44,14 @@ from alphacut.frame.bounds.kernel import (
     examine,
     stays_below,
 )
-from alphacut.frame.bounds.remainders import majorant_parts, remainder_bounds
 from alphacut.frame.bounds.spatial_branch_and_bound import prove
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.methods.proof import bound_levels
 from alphacut.frame.modes.damped import DampedModes, DampedStructure, require_dissipation
-from alphacut.frame.modes.modal_model import ModalModel
-from alphacut.frame.modes.model_error import (
+from alphacut.frame.modes.modal_model import (
     EnergyNorms,
+    ModalModel,
     largest_growth,
     proved_error,
     response_parts,

@@ -19,7 +19,7 @@ from alphacut.frame import (
 from alphacut.frame.boxes import Boxes, UnitFlow, boxes
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.modes.damped_modes import damped_modes
+from alphacut.frame.modes.modes import damped_modes
 from alphacut.frame.verification.self_test import structures_at
 from alphacut.fuzzy import Interval
 from tests.frame.motions import random_points, require_inside

@@ -25,11 +25,8 @@ from alphacut.frame.modes.blocks import (
     subspace_series,
 )
 from alphacut.frame.modes.classical_modes import ModeSelection, classical_modes
-from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
-from alphacut.frame.modes.intervening import (
-    BlockParticipation,
-    Excitation,
-)
+from alphacut.frame.modes.clusters import BlockParticipation, centred_matrices, enclose_subspaces
+from alphacut.frame.modes.modes import Excitation
 from alphacut.frame.modes.structure import classical_structure
 from alphacut.frame.modes.truncated_modes import (
     WeightedSums,

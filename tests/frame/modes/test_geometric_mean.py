@@ -6,7 +6,7 @@ from scipy.linalg import sqrtm
 
 from alphacut.frame import Proof, StoreyFrame, UnprovedError, envelope
 from alphacut.frame.calculus.taylor_model import TaylorModel
-from alphacut.frame.modes.geometric_mean import geometric_mean, right_side_bound
+from alphacut.frame.modes.damped import geometric_mean, right_side_bound
 from alphacut.fuzzy import Interval
 from tests.frame.motions import exact_motions
 
