@@ -1,11 +1,11 @@
-"""Which modes form blocks: those that meet or come near in the box; and their intervening variables.
+"""Which modes form blocks, those that meet or come near in the box, and what they respond by.
 
-Intervening variables (section 7 of the paper) are functions of the inputs of which the response is made
-(Barthelemy, Haftka 1993). They are Taylor models with proved remainders. An output is Σ_k Σ_s c_ks e_s(ω_k, g_k; t) over modes k and sources s (loads, velocity,
-start), with few numbers for each mode: its frequency ω_k, its decay g_k and its participation
-factors c_ks = (r·x)(x·M v_s)/(x·M x). Here x is the mode shape, r the row of the output, and v_s
-the pattern of the ground or the initial state. These numbers bend little over the box, however many
-inputs it has.
+Intervening variables (section 7 of the paper) are functions of the inputs of which the response is
+made (Barthelemy, Haftka 1993). They are Taylor models with proved remainders. An output is Σ_k Σ_s
+c_ks e_s(ω_k, g_k; t) over modes k and sources s (loads, velocity, start), with few numbers for each
+mode: its frequency ω_k, its decay g_k and its participation factors c_ks = (r·x)(x·M v_s)/(x·M x).
+Here x is the mode shape, r the row of the output, and v_s the pattern of the ground or the initial
+state. These numbers bend little over the box, however many inputs it has.
 
 A block of p modes with the invariant subspace K X = M X L contributes a e(L) β, with a = r X and
 β = N⁻¹ Xᵀ M v, N = Xᵀ M X. Each diagonal entry of L is an oscillator with the participation factor
