@@ -1,9 +1,9 @@
 """Modes of all structures in a box of inputs, and what they leave open, whoever supplies them.
 
 Classical modes are supplied by `classical_modes`. Modes that dashpots couple are supplied here, as
-oscillators: a damped mode λ = −g + iω with the coefficient C = a + ib adds 2 Re C ρ(t; λ) to an output,
-with the Duhamel integral ρ of a load, or exp(λ t). In the responses of `Source`, Re ρ + (g/ω) Im ρ
-of a displacement and Im ρ/ω, it is
+oscillators: a damped mode λ = −g + iω with the coefficient C = a + ib adds 2 Re C ρ(t; λ) to an
+output, with the Duhamel integral ρ of a load, or exp(λ t). In the responses of `Source`, Re ρ +
+(g/ω) Im ρ of a displacement and Im ρ/ω, it is
 
     2 Re C ρ = 2 a (Re ρ + (g/ω) Im ρ) − 2 (a g + b ω) Im ρ/ω.
 
