@@ -11,7 +11,6 @@ alone: models are not made anew, and participation factors keep their ranges ove
 
 from __future__ import annotations
 
-from heapq import heappush, heapreplace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,16 +20,7 @@ from alphacut.base.kernels import compiled
 from alphacut.frame import numbers
 from alphacut.frame.bounds.dual_function import DualFunctionData, minimise
 from alphacut.frame.bounds.level import LevelModels, OutputBounds
-
-
-class PeakCell(NamedTuple):
-    """A cell with its bound; cells are ordered by bounds, and equal ones by number."""
-
-    bound: float  # lower bound of the peak over it
-    number: int  # of the cell
-    ends: Ints  # first and last point along ω, then along q, of the modes' tables, (K, 4)
-    node: int  # time node at which the bound is that of |output|
-    at: Array  # inputs that the dual bound names, in unit coordinates, (d,)
+from alphacut.frame.bounds.node_bounds import Cells, halve_cell
 
 
 class CellEffort(NamedTuple):
@@ -73,23 +63,38 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
         steps=numbers.LEAST_PEAK_STEPS,
         patience=numbers.LEAST_PEAK_PATIENCE,
     )
+    max_cells = 1 + numbers.LEAST_PEAK_BISECTIONS
+    cells = Cells(
+        ends=np.zeros((max_cells, *data.cell.shape), np.int64),
+        mu=np.zeros((max_cells, 0)),  # multipliers are kept by node
+        disagreement=np.zeros((max_cells, len(data.linear))),
+        value=np.zeros(max_cells),  # lower bounds of the peak over the cells
+    )
+    cells.ends[0] = data.cell
+    at = np.zeros((max_cells, data.linear.shape[1]))
 
-    def bounded_cell(ends: Ints, number: int, parent_bound: float) -> PeakCell:
-        """Return a cell with its bound, or the bound of the cell it was halved from, if higher."""
-        at = np.zeros(data.linear.shape[1])
-        bound, node = _bound_cell(ends, data_of_sides, constants, effort, multipliers, at)
-        return PeakCell(max(bound, parent_bound), number, ends, node, at)
+    def improve(cell: int) -> None:
+        """Raise the bound of a cell, which holds already where it is that of a larger cell."""
+        bound = _bound_cell(
+            cells.ends[cell],
+            data_of_sides,
+            constants,
+            effort,
+            multipliers,
+            at[cell],
+            cells.disagreement[cell],
+        )
+        cells.value[cell] = max(bound, cells.value[cell])
 
-    cells = [bounded_cell(data.cell.astype(np.int64), 0, 0.0)]
-    for number in range(1, 2 * numbers.LEAST_PEAK_BISECTIONS, 2):
-        lowest = cells[0]
-        halves = _halves(lowest, data)
-        if halves is None:
+    improve(0)
+    lowest = 0
+    for count in range(1, max_cells):
+        if not halve_cell(cells, lowest, count):
             break
-        lower_half, upper_half = halves
-        heapreplace(cells, bounded_cell(lower_half, number, lowest.bound))
-        heappush(cells, bounded_cell(upper_half, number + 1, lowest.bound))
-    return cells[0].bound, cells[0].at
+        improve(lowest)
+        improve(count)
+        lowest = int(cells.value[: count + 1].argmin())
+    return float(cells.value[lowest]), at[lowest]
 
 
 @compiled
@@ -100,8 +105,9 @@ def _bound_cell(
     effort: CellEffort,
     multipliers: Array,
     at: Array,
-) -> tuple[float, int]:
-    """Return the largest lower bound of |output| over a cell at some time nodes, and its node.
+    disagreement: Array,
+) -> float:
+    """Return the largest lower bound of |output| over a cell at some time nodes.
 
     The nodes are peaks over time of the response at the middle of the cell, the largest first.
 
@@ -112,6 +118,8 @@ def _bound_cell(
         effort: What the cell is worth.
         multipliers: Multipliers of each node, shape (T, Z); improved in place.
         at: Overwritten with the inputs that the dual bound names, shape (d,).
+        disagreement: Overwritten with that of the variables at the node of the bound, see
+            `minimise`, shape (Z,).
     """
     data = sides[0]
     response = np.zeros(data.table.shape[2])  # at the middle of the cell
@@ -127,9 +135,8 @@ def _bound_cell(
         if magnitude[t] < max(magnitude[max(t - 1, 0)], magnitude[min(t + 1, len(magnitude) - 1)]):
             untried[t] = -1.0
     largest = -np.inf
-    largest_node = 0
     u = np.zeros(len(at))
-    disagreement = np.empty(multipliers.shape[1])  # not used
+    of_node = np.empty(len(disagreement))
     for _ in range(effort.nodes):
         node = int(untried.argmax())
         if untried[node] <= max(largest, -1.0):
@@ -147,57 +154,12 @@ def _bound_cell(
             effort.patience,
             -1e300,  # no target
             (2.0 * s - 1.0) * response[node],
-            disagreement,
+            of_node,
             u,
         )
         lower_bound = -(dual_bound + constants[s, node])
         if lower_bound > largest:
             largest = lower_bound
-            largest_node = node
             at[:] = u
-    return largest, largest_node
-
-
-def _halves(cell: PeakCell, data: DualFunctionData) -> tuple[Ints, Ints] | None:
-    """Return both halves of a cell of the modes' tables; None where no range has a point inside.
-
-    The cell is halved along the frequency ω, or the quotient q = g/ω of decay and frequency, of
-    that mode whose contribution to the output at the node of the bound varies most along this axis.
-    The point in the middle belongs to both halves. The cell is not changed.
-
-    Args:
-        cell: `ends` are first and last point along ω, then along q, of each of K tables, shape (K,
-            4); `node` is the time node.
-        data: `table`, responses of each mode to unit sources, shape (K, sources, T, points) with ω
-            running fastest among the points, and `participation`, their factors, shape (K,
-            sources).
-
-    Returns:
-        The ends of the lower and of the upper half, shape (K, 4) each.
-    """
-    largest = -1.0
-    chosen = None
-    width = int(data.grid_points[0])
-    for k in range(len(cell.ends)):
-        first, last, low, high = map(int, cell.ends[k])
-        table = data.table[k, :, cell.node].reshape(len(data.participation[k]), -1, width)
-        in_cell = table[:, low : high + 1, first : last + 1]  # (sources, q, ω)
-        response = np.tensordot(data.participation[k], in_cell, 1)  # (q, ω)
-        along_omega = float(np.ptp(response, axis=1).max())
-        along_q = float(np.ptp(response, axis=0).max())
-        for variation, begin, length in (
-            (along_omega, 0, last - first),
-            (along_q, 2, high - low),
-        ):
-            if length > 1 and variation > largest:
-                largest = variation
-                chosen = k, begin
-    if chosen is None:
-        return None
-    k, begin = chosen
-    lower = cell.ends.copy()
-    upper = cell.ends.copy()
-    middle = (cell.ends[k, begin] + cell.ends[k, begin + 1]) // 2
-    lower[k, begin + 1] = middle
-    upper[k, begin] = middle
-    return lower, upper
+            disagreement[:] = of_node
+    return largest
