@@ -26,7 +26,7 @@ NARROWED = 0.5
 """Sum over the inputs of the pruned fractions of a box from which on the rest is bounded anew
 instead of being bisected. A larger number bisects more often."""
 
-# The dual bound (`bounds.level`, `bounds.node_bounds`, `bounds.pruning`, `bounds.least_peaks`).
+# The dual bound (`bounds.box`, `bounds.level`, `bounds.node_bounds`).
 
 TABLE_SPACING = 0.07
 """Distance of neighbouring points of the table of a mode along ω and g, as a fraction of the decay

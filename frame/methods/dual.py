@@ -20,11 +20,9 @@ from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import checked_number
 from alphacut.base.progress_bar import Progress, nth_subprogress, subprogress
 from alphacut.frame import numbers
-from alphacut.frame.bounds.box import Box
+from alphacut.frame.bounds.box import Box, prune_ends, remainder_addition
 from alphacut.frame.bounds.box_proof import Answer, BoxBounds, Goal, PrunedPeaks
-from alphacut.frame.bounds.least_peaks import least_peak
-from alphacut.frame.bounds.level import LevelModels, OutputBounds, improve_all
-from alphacut.frame.bounds.pruning import prune_ends, remainder_addition
+from alphacut.frame.bounds.level import LevelModels, OutputBounds, improve_all, least_peak
 from alphacut.frame.bounds.spatial_branch_and_bound import halvings, prove
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError

@@ -6,9 +6,8 @@ import pytest
 
 from alphacut.frame import Exact, LinearFlow, UnprovedError
 from alphacut.frame.bounds import dual_function
-from alphacut.frame.bounds.box import Box
+from alphacut.frame.bounds.box import Box, prune_ends
 from alphacut.frame.bounds.level import OutputBounds
-from alphacut.frame.bounds.pruning import prune_ends
 from tests.frame.bounds.test_dual_proof import CASES, each_storey, near, record, storeys
 from tests.frame.motions import exact_motions, random_points
 
