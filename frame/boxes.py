@@ -12,7 +12,7 @@ import numpy as np
 from alphacut.base.arrays import Ints, Mask
 from alphacut.base.errors import require_numbers
 from alphacut.base.progress_bar import Progress, nth_subprogress
-from alphacut.frame.calculus.jet import Array, Jet
+from alphacut.frame.calculus.polynomials import Array, Jet
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.result import Envelope
 from alphacut.frame.structures.quantities import Output

@@ -15,7 +15,7 @@ from alphacut.base.progress_bar import Progress
 from alphacut.frame.analyses.peaks import Peak, close_peaks
 from alphacut.frame.bounds.acceleration_gain import acceleration_gain
 from alphacut.frame.boxes import Boxes, boxes
-from alphacut.frame.calculus.jet import Jet
+from alphacut.frame.calculus.polynomials import Jet
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact

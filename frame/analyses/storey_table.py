@@ -7,7 +7,7 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.number_text import STANDARD_GRAVITY, Table, engineering, percent_text
 from alphacut.frame.analyses.answer import table_of
-from alphacut.frame.calculus.jet import Jet
+from alphacut.frame.calculus.polynomials import Jet
 from alphacut.frame.structures.storey import StoreyFrame
 
 

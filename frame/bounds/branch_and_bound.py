@@ -39,7 +39,7 @@ from alphacut.frame.bounds.kernel import (
     examine,
 )
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
-from alphacut.frame.calculus.monomials import count, exponents, product_part, product_places
+from alphacut.frame.calculus.polynomials import count, exponents, product_part, product_places
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.modes.modal_model import (
     ModalModel,

@@ -27,7 +27,7 @@ from alphacut.base.progress_bar import Progress
 from alphacut.frame import numbers
 from alphacut.frame.bounds.dual_function import DualFunctionData, minimise, require_in_range
 from alphacut.frame.bounds.node_bounds import Cells, Effort, bound_nodes, halve_cell
-from alphacut.frame.calculus.monomials import monomials
+from alphacut.frame.calculus.polynomials import monomials
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.modes.modes import Modes, Oscillator
 from alphacut.frame.response.oscillators import (

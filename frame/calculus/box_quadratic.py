@@ -7,7 +7,7 @@ from itertools import combinations, product
 import numpy as np
 
 from alphacut.base.kernels import compiled
-from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.polynomials import Array
 
 # Fraction of max|H| by which Hessians are made more concave before they are solved. It is far above
 # the unit roundoff, so that no Hessian stays singular, and far below what changes a maximum

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.frame.calculus.monomials import (
+from alphacut.frame.calculus.polynomials import (
     convolve,
     derivative,
     exponents,

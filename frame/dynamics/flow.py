@@ -19,7 +19,7 @@ from alphacut.base.errors import (
     require,
     require_choice,
 )
-from alphacut.frame.calculus.jet import Array, Jet, concatenate
+from alphacut.frame.calculus.polynomials import Array, Jet, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint, StepMap, state_matrix
 from alphacut.frame.dynamics.modal_trajectory import classical_trajectory, modal_trajectory

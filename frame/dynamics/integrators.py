@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.base.errors import require
-from alphacut.frame.calculus.jet import Array, Jet, concatenate, inverse
+from alphacut.frame.calculus.polynomials import Array, Jet, concatenate, inverse
 from alphacut.frame.records.history import History
 from alphacut.frame.structures.linear import Matrices
 

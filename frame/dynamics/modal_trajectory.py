@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.base.kernels import compiled
-from alphacut.frame.calculus.jet import Array, Jet, inverse
+from alphacut.frame.calculus.polynomials import Array, Jet, inverse
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.records.history import History
 from alphacut.frame.response.duhamel import responses_at_nodes, step_integrals

@@ -20,7 +20,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import require_choice
 from alphacut.base.kernels import compiled
 from alphacut.frame.calculus.box_quadratic import solve_in_place
-from alphacut.frame.calculus.jet import Jet
+from alphacut.frame.calculus.polynomials import Jet
 from alphacut.frame.calculus.tape import Tape, tape, with_derivatives
 from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError
 from alphacut.frame.dynamics.integrators import INTEGRATORS, Integrator

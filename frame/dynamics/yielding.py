@@ -23,7 +23,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.kernels import compiled
-from alphacut.frame.calculus.jet import Jet
+from alphacut.frame.calculus.polynomials import Jet
 from alphacut.frame.dynamics.flow import Flow, StepError, with_feedthrough
 from alphacut.frame.dynamics.integrators import SAME, state_matrix
 from alphacut.frame.records.history import History

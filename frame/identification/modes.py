@@ -16,7 +16,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, checked_number, require, require_numbers
-from alphacut.frame.calculus.jet import Jet
+from alphacut.frame.calculus.polynomials import Jet
 from alphacut.frame.structures.linear import undamped_modes
 from alphacut.frame.structures.storey import StoreyFrame, chain_matrix, diagonal
 from alphacut.fuzzy import Crisp, FuzzyNumber, from_data

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints, Mask
-from alphacut.frame.calculus.monomials import matmul, monomials, product_part
+from alphacut.frame.calculus.polynomials import matmul, monomials, product_part
 from alphacut.frame.calculus.taylor_model import TaylorModel, inverse_bound
 
 MIN_DEGREE, MAX_DEGREE = 4, 10

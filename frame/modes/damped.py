@@ -19,7 +19,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.frame.boxes import Boxes
-from alphacut.frame.calculus.monomials import matmul, product_part
+from alphacut.frame.calculus.polynomials import matmul, product_part
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate, solution_series, solve
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.structure import parameter_models

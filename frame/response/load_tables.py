@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from alphacut.base.arrays import Ints
 from alphacut.base.kernels import compiled
-from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.polynomials import Array
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.records.history import History

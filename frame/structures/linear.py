@@ -16,7 +16,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.errors import RefusedError, require
-from alphacut.frame.calculus.jet import Jet, concatenate, inverse, variables
+from alphacut.frame.calculus.polynomials import Jet, concatenate, inverse, variables
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.records.history import Accelerogram, History

@@ -21,7 +21,7 @@ from alphacut.base.errors import (
     require_numbers,
     require_sequence,
 )
-from alphacut.frame.calculus.jet import Jet, variables
+from alphacut.frame.calculus.polynomials import Jet, variables
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.structures.linear import (

@@ -26,7 +26,7 @@ from alphacut.base.errors import (
 )
 from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.base.quantity import Quantity
-from alphacut.frame.calculus.jet import Jet
+from alphacut.frame.calculus.polynomials import Jet
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.structures.linear import Assembly, LinearSystem, Number, in_periods, stack
 from alphacut.frame.structures.loads import Force, distinct_histories, require_loads

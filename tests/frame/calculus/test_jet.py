@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.frame.calculus.jet import Jet, inverse, variables
+from alphacut.frame.calculus.polynomials import Jet, inverse, variables
 from tests.frame.differences import require_derivatives
 
 FUNCTIONS = {
