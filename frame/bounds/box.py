@@ -27,10 +27,10 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.modes.classical_modes import classical_modes
 from alphacut.frame.modes.modes import Excitation, damped_modes
-from alphacut.frame.modes.point_modes import PointModes
 from alphacut.frame.modes.structure import (
     ClassicalStructure,
     CoupledModesError,
+    PointModes,
     classical_structure,
     parameter_models,
 )

@@ -8,7 +8,7 @@ from alphacut.base.arrays import Array
 from alphacut.frame.bounds.box_proof import ROUNDING_MARGIN
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.dynamics.flow import exact_flow
-from alphacut.frame.modes.point_modes import PointModes
+from alphacut.frame.modes.structure import PointModes
 from alphacut.frame.verification.self_test import structures_at
 
 EXCESS = 10.0

@@ -14,7 +14,7 @@ from alphacut.frame import (
 )
 from alphacut.frame.bounds.box import Box
 from alphacut.frame.bounds.box_proof import ROUNDING_MARGIN
-from alphacut.frame.modes.point_modes import PointModes
+from alphacut.frame.modes.structure import PointModes
 from alphacut.frame.verification.self_test import structures_at
 from alphacut.fuzzy import Crisp, Interval
 from tests.frame.modes.test_blocks import masses_on_springs
