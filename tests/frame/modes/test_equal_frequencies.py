@@ -16,7 +16,7 @@ from alphacut.frame import (
     envelope,
 )
 from alphacut.fuzzy import Interval
-from tests.frame.motions import exact_motions, require_inside
+from tests.frame.motions import exact_motions
 
 EYE = np.eye(4)
 CHAIN = np.array([[2.0, -1], [-1, 1]])
@@ -125,26 +125,3 @@ def test_damping_by_ratios_is_smooth_where_modes_of_one_ratio_meet(rng):
     assert found.first[0, 0, :, 0] == pytest.approx(slope, abs=1e-4)
     bend = (motion(h, h) - motion(h, -h) - motion(-h, h) + motion(-h, -h)) / (4 * h * h)
     assert found.second[0, 1, 0, :, 0] == pytest.approx(bend, abs=1e-3)
-
-
-@pytest.mark.parametrize("dashpots", [0.5 * np.diag([1.0, 0, 1, 0]), 0.5 * EYE])
-def test_dashpots_alike_in_both_directions_are_proved(dashpots):
-    system = MatrixStructure(
-        {"a": 610.0, "b": 610.0},
-        [(1.0, EYE)],
-        [("a", np.kron(np.diag([1.0, 0]), CHAIN)), ("b", np.kron(np.diag([0, 1.0]), CHAIN))],
-        {"qx": EYE[1], "qy": EYE[3]},
-        damping=[(1.0, dashpots)],
-        q0=np.array([0.01, 0.02, 0.01, 0.02]),
-    )
-    inputs = {name: Interval(600, 620) for name in "ab"}
-    found = envelope(system, inputs, **{**GIVEN, "duration": 1.0})
-    assert found.nature == "guaranteed"
-    time = found.time
-    for k in (600.0, 607.0, 620.0):
-        state = np.block([[np.zeros((4, 4)), EYE], [-k * BOTH, -dashpots]])
-        values, shapes = np.linalg.eig(state)
-        modal = np.linalg.solve(shapes, np.append(system.q0, np.zeros(4)))
-        motion = ((shapes[[1, 3]] * modal) @ np.exp(values[:, None] * time)).real.T
-        require_inside(motion[None], found, slack=1e-11)
-    assert np.ptp(found.upper[0], axis=1).max() < 1e-3 * found.upper.max()
