@@ -83,7 +83,10 @@ beyond the largest one rounding dominates."""
 
 DEVIATION_POINTS = 24
 """Points along ω of each mode at which its distance from straight lines between the nodes is
-computed. More narrow the bound between the nodes slightly."""
+computed, at least. More narrow the bound between the nodes slightly."""
+DEVIATION_DISTANCE = 0.1
+"""Largest distance of these points over the decay of a mode that turns by more than 1 rad in a
+step, up to three times as many points. More cost time in proportion."""
 NEWTON_GAP = 0.02
 """Fraction of the gap that Newton's method may leave. A larger number saves steps and leaves less
 of the gap to the search."""

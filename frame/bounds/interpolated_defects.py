@@ -471,7 +471,7 @@ def _elastic_violations(
         small: See `defects`.
     """
     best = _elastic_violations_on(model, force, level, variation, TIME_PARTS[0])
-    enough = max(SMALL_VIOLATION * model.low.force, small * np.sqrt(model.low.slider))
+    enough = np.maximum(SMALL_VIOLATION * model.low.force, small * np.sqrt(model.low.slider))
     rough = np.arange(len(force))
     for pieces in TIME_PARTS[1:]:
         # Control points on shorter parts of the time lie closer to the force.

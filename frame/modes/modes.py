@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import comb
+from math import ceil, comb
 from typing import NamedTuple
 
 import numpy as np
@@ -245,11 +245,28 @@ class Modes:
         """
         deviations = []
         for mode in self.oscillators:
-            points = (numbers.DEVIATION_POINTS, 3)
+            points = self._deviation_points(mode)
             grid = grid_over(mode.omega_range, mode.quotient_range, points)
             oscillators = Oscillators(grid, self.time, (0,))
             deviations.append([oscillators.line_deviation(source, 0) for source in self.sources])
         return self.with_deviations({0: np.array(deviations)})
+
+    def _deviation_points(self, mode: Oscillator) -> tuple[int, int]:
+        """Return the numbers of points along ω and along q = g/ω for `interpolation_error`.
+
+        A mode that turns far within a step follows a smooth load closely, and may be farther from a
+        chord by what interpolation between the points leaves open: (h/g)⁴ of its response over q,
+        but for a factor, with the distance h of the points and the decay g. A limit of h/g, tuned,
+        lets this be a few per cent of what the mode contributes.
+        """
+        low, high = mode.omega_range
+        least, most = mode.quotient_range
+        along_omega, along_quotient = numbers.DEVIATION_POINTS, 3
+        if high * float(np.diff(self.time).max(initial=0.0)) > 1 and least > 0:
+            distance = numbers.DEVIATION_DISTANCE * least * low
+            along_omega = max(along_omega, ceil((high - low) / distance) + 1)
+            along_quotient = max(along_quotient, ceil((most - least) * high / distance) + 1)
+        return min(along_omega, 3 * numbers.DEVIATION_POINTS), min(along_quotient, 7)
 
     def with_deviations(self, deviations: dict[int, Array]) -> Array:
         """Return the same bound from those of the oscillators' responses to unit sources.

@@ -176,3 +176,19 @@ def test_bounds_before_a_jump_of_a_force_at_a_node_hold_and_count_it_once(method
             assert (sign * values <= bound + 1e-9).all()
     jump = 1.2e4 * samples[-1] / 5e4
     assert bounds.between[end, 1] <= 1.1 * jump
+
+
+def test_a_stiff_mode_that_is_lightly_damped_follows_a_slow_force_between_nodes(rng):
+    mass, omega, step = 2.0, float(rng.uniform(550, 700)), 0.005
+    slow = History(2.0, np.ones(2), frequency=float(rng.uniform(8, 15)))
+    frame = StoreyFrame(
+        masses=[mass],
+        stiffness=[mass * omega**2],
+        damping_ratio=0.01,
+        outputs=("a1",),
+        loads=[Force(1, 1.0, slow)],
+    )
+    inputs = {"m1": Interval(0.95 * mass, 1.05 * mass), "zeta": Interval(0.008, 0.012)}
+    motion = {"duration": 1.8, "step": step, "alpha": [0.0], "progress": False}
+    bounds = envelope(frame, inputs, Proof(workers=1), **motion)
+    assert bounds.between[-50:].max() <= 0.1 / mass
