@@ -72,7 +72,7 @@ def settled(
         if said is not None and not isclose(each.value, said.value, rel_tol=tolerance):
             if key in override:
                 return replace(said, remark=f"its own {key}, {each}, is overridden by {said}")
-            cure = f'leave {key} out, or say override = ["{key}"] if the file is wrong'
+            cure = f'say {key} as the file does, or override = ["{key}"] if it is wrong'
             raise RefusedError(name, f"of {key} {each}", f"{key} {said}, as is said", cure)
         first = first or each
         if said is None and not isclose(each.value, first.value, rel_tol=tolerance):

@@ -18,7 +18,8 @@ from typing import NamedTuple
 _PREFIXES = {
     "p": 1e-12, "pico~": 1e-12, "n": 1e-9, "nano~": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6,
     "micro~": 1e-6, "m": 1e-3, "milli~": 1e-3, "c": 1e-2, "centi~": 1e-2, "d": 0.1, "da": 10.0,
-    "h": 1e2, "k": 1e3, "kilo~": 1e3, "M": 1e6, "mega~": 1e6, "G": 1e9, "giga~": 1e9, "": 1.0,
+    "h": 1e2, "k": 1e3, "kilo~": 1e3, "M": 1e6, "mega~": 1e6, "deca~": 10.0, "G": 1e9,
+    "giga~": 1e9, "": 1.0,
 }  # fmt: skip
 # In each line the value in SI, the dimension (its factors joined by "·"), and the names, with the
 # prefixes that they take in brackets; * stands for the names of prefixes. Blanks within a name, and
@@ -29,6 +30,7 @@ _VOCABULARY = """
 .3048 m ft foot feet
 1e-10 m Å angstrom angstroms ångström
 1e-6 m micron microns
+2.54e-5 m thou mil mils
 1 s s(n,u,µ,μ,m) second(*) seconds(*) sec(m) secs seg sek segundo segundos seconde secondes
 1 s Sekunde Sekunden
 60 s min minute minutes Minuten
@@ -67,11 +69,11 @@ _VOCABULARY = """
 1 m·s-1 mps
 .01 m·s-1 kine kines cmps
 1 cycle·s-1 Hz(m,k,M) hertz(*) cps c.p.s
-1 cycle cycle cycles Schwingung Schwingungen oscillation oscillations vibration vibrations
+1 cycle cyc cycle cycles Schwingung Schwingungen oscillation oscillations vibration vibrations
 1 cycle turn turns rev revolution revolutions
 .016666666666666666 cycle·s-1 rpm cpm
 1 sample·s-1 sps
-1 sample sample samples point points pts spl
+1 sample sample samples point points pts spl value values reading readings
 1 rad rad(m) radian(*) radians(*)
 .017453292519943295 rad deg degree degrees °
 1 count count counts cnts digit digits bit bits lsb
@@ -125,8 +127,8 @@ _QUANTITIES = {
 
 TRANSFORMED = (
     r"\b(?:normali[sz]ed|normali[sz]ation|non-?dimensional\w*|dimensionless|scaled\s+by|divided|squared?|roots?"
-    r"|log(?:10|arithm\w*)?|invers\w+|inverted|reciprocal\w*|tenths?|hundredths?|thousandths?"
-    r"|hundreds|thousands|millions)\b"
+    r"|log(?:10|arithm\w*)?|invers\w+|inverted|doubled|halved|twice|reciprocal\w*|tenths?|hundredths?|thousandths?"
+    r"|hundreds|thousands|millions|units\s+of\s+(?:the|its))\b"
 )
 """Words of numbers that are no longer in the unit beside them, in small letters."""
 
@@ -178,6 +180,12 @@ class Mention(NamedTuple):
     def values(self) -> tuple[float, ...]:
         """The numbers in SI."""
         return tuple(number * self.unit.factor for number in self.numbers)
+
+    @property
+    def is_multiple(self) -> bool:
+        """Whether a factor that is not 1 stands beside the unit, as in "0.1 g" or "g/2"."""
+        is_divided = re.match(r"[\s\])]*[/*×·]\s*\d", self.behind) is not None
+        return is_divided or self.numbers not in ((), (1.0,))
 
     @property
     def shown(self) -> str:
@@ -344,13 +352,8 @@ def mentions(text: str) -> list[Mention]:
             # A number before another unit belongs to that.
             if behind and index + 1 < len(spans) and not plain[behind.end() : next_start].strip():
                 behind = None
-        # Samples, pixels and cycles alone are words; so is "in" before others.
-        is_word = unit.dimension in ("sample", "pixel", "voxel", "cycle")
-        if name.lower() == "in":
-            is_bracketed = re.search(r"[\[(]\s*$", plain[:start]) is not None
-            is_word = not (number or is_bracketed) or re.match(r"\s*\w", plain[end:]) is not None
-        if is_word:
-            continue
+        if unit.dimension in ("sample", "pixel", "voxel", "cycle"):
+            continue  # which are words
         is_single = len(parsed.atoms) == 1 and parsed.atoms[0][1] == 1
         is_last = _NAMED_NUMBERS.search(plain, 0, start) and not plain[end:].strip(" .\"'#)")
         is_sure = bool(
@@ -365,14 +368,18 @@ def mentions(text: str) -> list[Mention]:
         stop = behind.end() if behind else end
         before, rest = plain[last_end:begin], plain[stop:next_start]
         if index + 1 < len(spans):  # what stands before another unit is its own, but for a clause
-            clause = re.match(r"[^,;|)]*?(?=[,;|)]|\s(?:in|at|and)\s)", rest)
+            clause = re.match(r"[^,;|)]*(?=[,;|)])|.*?(?=\s(?:in|at|and)\s)", rest)
             rest = clause[0] if clause else ""
         found.append(Mention(unit, name, numbers, before, rest, is_sure, begin, stop))
         last_end = stop
     return found
 
 
-_NAME = re.compile(r"t\s*(?:[/_(\[]\s*\(?\d*\s*(?:[nuµm]?s(?:ec)?\b|min|n\b)|,)|[a-z]\s*=", re.I)
+_NAME = re.compile(
+    r"t\s*(?:[/_(\[]\s*\(?\d*\s*(?:[nuµm]?s(?:ec)?\b|min|n\b)|,)|(?<!\d)(?<!\d\s)[a-z]\s*="
+    r"|in\s+[a-zµμ%°]",
+    re.IGNORECASE,
+)
 
 
 def _spans(text: str) -> Iterator[tuple[int, _Parsed]]:
@@ -383,9 +390,10 @@ def _spans(text: str) -> Iterator[tuple[int, _Parsed]]:
         if start < end or (match[0].isdigit() and not re.match(r"10\s*\*?\s*g\b", text[start:])):
             continue
         # Names of columns and other quantities, as "t (s)", "t/ms", "T_n" and "h = 3 m".
-        is_name = _NAME.match(text, start)
-        parsed = None if is_name else _parsed(text, start)
-        if parsed is not None:
+        parsed = None if _NAME.match(text, start) else _parsed(text, start)
+        is_word = parsed is not None and text[start : parsed.end].lower() == "in"
+        is_word = is_word and re.search(r"[\d\[(]\s*$", text[:start]) is None
+        if parsed is not None and not is_word:
             end = parsed.end
             yield start, parsed
 

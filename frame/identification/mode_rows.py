@@ -52,7 +52,7 @@ class ModeRows:
 # Words of numbers that are no frequencies in a unit, but periods, angular ones or quotients.
 _OTHER_NUMBERS = (
     r"(?i)\b(?:periods?|omega\w*|angular|circular|pulsations?|eigenvalues?|lambda|2\s*[x×*·]?\s*pi"
-    r"|ratios?|per\s?cent|perioden?)\b|ω|2\s*[x×*·]?\s*π|^T\b|\bf\w?\s*/\s*f"
+    r"|ratios?|relative|reduced|per\s?cent|db|decibels?|half|perioden?)\b|\b1\s*/\s*f|ω|2\s*[x×*·]?\s*π|^T\b|\bf\w?\s*/\s*f"
     rf"|{FACTOR}|{TRANSFORMED}|\bper\s+minute|\b(?:kreis|winkel)frequen"
 )
 _RELATIVE = (
@@ -94,7 +94,7 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
     for column, cell in enumerate(header):
         title = _title(cell)
         name = title.name
-        if re.fullmatch(r"(?i)(?:natural |eigen|modal )?freq(?:uency|\.)?|f_?n?", name):
+        if re.fullmatch(r"(?i)(?:nat(?:ural|\.) |eigen|modal )?freq(?:uency|\.)?|f_?n?", name):
             name = "frequency"
         elif re.fullmatch(r"(?i)mode(?:[_ ]?(?:no|nr|number))?\.?|no\.?|nr\.?", name):
             name = "mode"
@@ -105,8 +105,10 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
     if not override:
         comments = [x for x in text_of(path).splitlines() if x.startswith("#")]
         for text in [*header, *comments]:
-            rest = without_units(text, mentions(text))
-            is_other = re.search(_OTHER_NUMBERS, rest.strip(" #")) is not None
+            rest = without_units(text, mentions(text)).strip(" #")
+            # Shapes may be normalised.
+            clauses = [x for x in re.split("[,;]", rest) if not re.search("(?i)shape|vector", x)]
+            is_other = any(re.search(_OTHER_NUMBERS, clause) for clause in clauses)
             is_other |= re.search(r"(?i)(?:%|\bper\s?cent)\s+of\b", text) is not None
             if {"frequency_std", "shape_std"} & columns.keys():
                 is_other |= re.search(_RELATIVE, text) is not None
@@ -208,9 +210,10 @@ def _add_unit(
         _hertz_of(f"{name}, {place}", one.text)
     if one.dimension != FREQUENCY or (is_of_others and not is_named):
         return
-    is_multiple = one.numbers and re.search(r"(?i)\b(?:in|units?(?:\s+of)?)\W*$", one.before)
-    if is_multiple or not one.numbers:
-        hertz = _hertz_of(f"{name}, {place}", one.shown if is_multiple else one.text)
+    is_of_all = re.search(r"(?i)\b(?:in|units?(?:\s+of)?)\W*$", one.before) is not None
+    if is_of_all or not one.numbers:
+        text = f"a multiple, {one.shown}{one.behind[:9]}" if one.is_multiple else one.text
+        hertz = _hertz_of(f"{name}, {place}", text)
         stated.append(Stated(hertz, one.text, place))
     else:
         unsure.append(Stated(one.unit.factor, one.shown, place))

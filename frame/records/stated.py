@@ -30,12 +30,12 @@ _SITE = r"(?i)altitude|height|elevation|depth|coordinate|vs_?30|\bwave|peak|pg[v
 FACTOR = (
     r"(?:[x×*·]\s*|\b)10\s*(?:\^|\*\*|⁻|[²³⁴⁵⁶])|[x×*·]\s*10\s*[-−]\s*\d|\b1\.?0*e[-+]?\d"
     r"|[x×*·]\s*(?:1000*\b|0?\.\d)"
-    r"|\b(?:scal\w*[\s_]*factor|scal\w*(?=\s*[:=])|multipl\w*|divided|conversion)[\s:=]*(?:by\s+)?"
-    r"(?!1(?:\.0*)?\b)[\d.]"
+    r"|\b(?:scal\w*[\s_]*factor|scal\w*(?=\s*[:=])|multipl\w*|divided|conversion)[\s:=]*(?:(?:by|with)\s+)?"
+    r"(?!1(?:\.0*)?\b)[\d.]|\btimes\s+(?:\d|t\w+)|\bfactor\s*(?:of\s+)?[:=]?\s*(?!1\b)\d|(?<=[a-z])\s*/\s*10+\b"
 )
 # Words of times between samples, in some languages, and words of other times and frequencies.
 _SAMPLING = (
-    r"(?i)sampl|digiti|abtast|[ée]chant|muestre|campion|amostr|step|interval|spac(?:ed|ing)|increment"
+    r"(?i)samp|digiti|abtast|[ée]chant|muestre|campion|amostr|step|interval|spac(?:ed|ing)|increment"
     r"|every|schritt|paso|\bpas\b|passo|\brate|acquisition|(?<![a-z])d(?:elta)?[\s_-]*t(?![a-z])|Δ|\bdelta|@"
     r"|(?<![a-z])[ft]s\b"
 )
@@ -49,12 +49,12 @@ _BEHIND = r"[\s_]*(?:[\s:=@\"',]|\.{2,})*(?:(?:is|was|of|at|with|by)\s+)?"
 _NUMBER = r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?)(?![\d.]*\w)"
 _BARE_STEP = re.compile(
     r"(?:\b(?:sampl\w*|time|data|digiti[sz]\w*)[\s_-]*(?:interval|step|period|spacing|increment)s?"
-    r"|\b(?:interval|step|increment)s?|(?<![a-z])(?:d(?:elta)?[\s_-]*t|ts)|Δt|\bdelta)"
+    r"|(?:interval|step|increment)s?|(?<![a-z])(?:d(?:elta)?[\s_-]*t|ts)|Δt|\bdelta)"
     rf"{_BEHIND}{_NUMBER}",
     re.IGNORECASE,
 )
 _BARE_RATE = re.compile(
-    r"(?:\b(?:sampl\w*|digiti[sz]\w*|acquisition|data)[\s_-]*(?:rate|freq\w*)|(?<![a-z])fs\b"
+    r"(?:\b(?:sampl\w*|digiti[sz]\w*|acquisition|data)[\s_-]*(?:rate|freq\w*)|(?<![a-z])f_?s(?:amp\w*)?\b"
     rf"|^\W*rate(?=\s*[:=])){_BEHIND}{_NUMBER}",
     re.IGNORECASE,
 )
@@ -110,13 +110,15 @@ class TextStatements:
     def _add_clause(self, text: str, row: int, place: str) -> None:
         """Add what a line, or a part of it between semicolons, states."""
         all_units = mentions(text)
-        rest = without_units(text, all_units)
+        rest = without_units(text, [one for one in all_units if one.is_sure])
         units: list[Mention] = []
         for one in all_units:
             # The acceleration of gravity, as "1 g = 9.81 m/s2", is no unit of the samples.
             is_gravity = one.dimension == ACCELERATION and one.unit.factor != STANDARD_GRAVITY
             is_gravity &= any(isclose(x, STANDARD_GRAVITY, rel_tol=0.005) for x in one.values)
-            if not is_gravity:
+            # What a sensor gives, as "1 V = 1 g", is none either.
+            is_gain = one.before.strip() == "=" and units[-1:] and units[-1].dimension == "V"
+            if not is_gravity and not is_gain:
                 units.append(one)
             elif units and one.before.lstrip().startswith("="):
                 units.pop()
@@ -125,28 +127,32 @@ class TextStatements:
             if one.dimension == ACCELERATION:
                 self._add_unit(one, row, place, is_peak=is_peak)
             elif one.dimension == "s" and not one.numbers:
-                if re.search(
-                    r"(?i)\b(?:time|abscissa)s?\b[\s,:=(\[]*(?:in\s+)?$|\bt\W*$", one.before
-                ):
+                of_times = r"(?i)\b(?:time|abscissa)s?\W*(?:in\s+)?$|\b(?:t|in|units?)\W*$"
+                if re.search(of_times, one.before):
                     self.time_units.append(Stated(one.unit.factor, one.text, place))
             elif one.numbers and one.dimension in ("s", "s sample-1", *_RATES):
                 self._add_time(one, place, is_peak=is_peak)
             elif not is_peak and not re.search(_SITE, text):
-                self._add_other(one, row)
+                self._add_other(one, row, text)
         for pattern, unit in _SYSTEMS.items():
             if re.search(pattern, text, re.IGNORECASE):
                 self.units.append(Stated({"cm/s^2": 0.01}.get(unit, 1.0), unit, place))
         lengths = [x for x in all_units if x.dimension == "m" and not x.numbers]
         if lengths and re.search(r"(?i)\blengths?\b.*\btimes?\W+(?:in\W+)?s(?:ec)?\b", text):
             self.units.append(Stated(lengths[0].unit.factor, f"{lengths[0].text}/s^2", place))
-        if not is_peak and re.search(f"{FACTOR}|{TRANSFORMED}", rest, re.IGNORECASE):
+        if not is_peak and re.search(
+            f"{FACTOR}|{TRANSFORMED}", _BARE_STEP.sub("", rest), re.IGNORECASE
+        ):
             self.factors.append(row)
         for pattern, is_rate in ((_BARE_STEP, False), (_BARE_RATE, True)):
             for match in pattern.finditer(rest):
-                number = float(match["number"].lower().replace("d", "e"))
-                if number > 0:
-                    text_of_it = f"{match['number']} {'Hz' if is_rate else 's'}"
-                    self.steps.append(_step(number, text_of_it, place, is_rate=is_rate))
+                number = float(match["number"].lower().replace("d", "e")) or nan
+                shown = f"{match['number']} {'Hz' if is_rate else 's'}"
+                self.steps.append(_step(number, shown, place, is_rate=is_rate))
+        for match in re.finditer(rf"(?i)samp\w*{_BEHIND}{_NUMBER}", rest):
+            number = float(match["number"].lower().replace("d", "e"))
+            value = number if number < MAX_STEP else 1 / number
+            self.unsure_steps.append(Stated(value, match[0], place))
         # Loads, angles and drifts of an instrument or a site are no quantity of the numbers.
         name = named_quantity(rest)
         is_quantity = name.endswith(
@@ -160,32 +166,28 @@ class TextStatements:
         if re.search(_SENSOR, one.before) and not re.search(r"(?i)\bunits?\b", one.before):
             return
         stated = Stated(one.unit.factor, one.text, place)
-        is_multiple = one.numbers not in ((), (1.0,))
-        is_multiple |= re.match(r"\W*[/*×·]\s*\d", one.behind) is not None
         if is_peak:
             self.peak_units.append(stated)
         elif one.is_sure:
             self.units.append(stated)
-            if is_multiple:
+            if one.is_multiple:
                 self.factors.append(row)
         else:
-            self.unsure_units.append(replace(stated, value=nan) if is_multiple else stated)
+            self.unsure_units.append(replace(stated, value=nan) if one.is_multiple else stated)
 
-    def _add_other(self, one: Mention, row: int) -> None:
+    def _add_other(self, one: Mention, row: int, text: str) -> None:
         """Add the quantity of a unit that is none of acceleration, where it is of the samples."""
         if "sample" in one.dimension or not one.is_sure or one.numbers:
             return
-        is_named = re.search(r"(?i)\bunits?\b[^,]*$", one.before) is not None
-        # Lengths and angles in brackets are those of the site.
-        is_bracketed = one.before.rstrip().endswith(("(", "[")) and one.dimension not in (
-            "m",
-            "rad",
-        )
         name = one.unit.other_quantity
         if one.dimension in ("m2 s-4", "m2 s-3", "m2 s-2"):
             name = "another quantity"
-            is_named = True
-        if name and (is_named or is_bracketed or one.dimension == "count"):
+        is_named = re.search(r"(?i)\bunits?\b[^,]*$", one.before) is not None
+        # Lengths and angles are those of the site, unless a line calls them units.
+        is_bracketed = one.before.rstrip().endswith(("(", "["))
+        is_alone = not any(x.dimension == ACCELERATION for x in mentions(text))
+        is_of_samples = one.dimension not in ("m", "rad") and (is_bracketed or is_alone)
+        if name and (is_named or is_of_samples):
             self.quantities.append((f"{name} by its unit {one.text}", row))
 
     def _add_time(self, one: Mention, place: str, *, is_peak: bool) -> None:
@@ -204,7 +206,8 @@ class TextStatements:
         elif re.search(r"(?i)duration|dauer|dur[ée]e|duraci", one.before):
             self.durations.append(Stated(value, one.shown, place))
         elif is_sampling:
-            if re.search(r"(?i)filter|pass\b|corner|cut.?off|band", one.before) is None:
+            clause = re.split("[,;]", one.before)[-1]
+            if re.search(r"(?i)filter|pass\b|corner|cut.?off|band", clause) is None:
                 self.steps.append(stated)
         elif not is_peak and MIN_STEP <= stated.value < MAX_STEP:
             self.unsure_steps += [] if re.search(_OTHER_TIMES, around) else [stated]
@@ -214,12 +217,16 @@ def named_quantity(text: str) -> str:
     """Return the quantity that a line names, as "a velocity"; empty of an acceleration or none."""
     if other := re.search(r"\b(?:jerk|(?:angular|rotational)\s+acc\w*)", text, re.IGNORECASE):
         return "a jerk" if other[0].lower() == "jerk" else "an angular acceleration"
+    spectrum = r"\bspectral\s+acc|\b(?:response|fourier|amplitude|pseudo\W*\w*)\s+spectr\w+"
+    is_matched = re.search(r"match|compatib|target|artific|design|fit", text, re.IGNORECASE)
+    if re.search(spectrum, text, re.IGNORECASE) and not is_matched:
+        return "a spectrum"
     if re.search(r"(?:\b|_)(?:a|acc(?:el(?:s|eration\w*)?)?|ag)(?:\b|_)", text, re.IGNORECASE):
         return ""
     words_of_quantities = {
         "a displacement": r"disp(?:l\w*)?|displacements?|deflection|drift",
         "a velocity": r"vel(?:oc\w*)?|speed",
-        "a spectrum": r"(?:response|fourier|amplitude|pseudo\W*\w*)\s+spectr\w+|p?sa",
+        "a spectrum": r"p?sa",
         "a force": r"forces?|loads?|thrust|(?:base )?shear",
         "a strain": r"strains?",
         "a stress": r"stress(?:es)?|pressure",
@@ -228,7 +235,8 @@ def named_quantity(text: str) -> str:
         "a voltage": r"voltage|volts?",
     }
     for name, words in words_of_quantities.items():
-        if re.search(rf"(?:\b|_)(?:{words})(?:\b|_)", text, re.IGNORECASE):
+        is_named = re.search(rf"(?:\b|_)(?:{words})(?:\b|_)", text, re.IGNORECASE)
+        if is_named and not (is_matched and name == "a spectrum"):
             return name
     return ""
 

@@ -518,6 +518,7 @@ def _unit_of(
     is_spectrum = any(
         x.is_abscissa_of_spectrum or re.match("p?sa\b", x.name) for x in table.columns
     )
+    is_spectrum |= any(name == "a spectrum" for name, _ in found.quantities)
     what = "a spectrum" if is_spectrum else named or by_unit or elsewhere
     if column.is_time or what:
         what = what or "one of times, which stand in the first"

@@ -50,7 +50,7 @@ _IN_UNITS = r"(?i)\b(?:in|units?(?:\s+of)?)\W*$|[\[(]\s*$|^\W*$"
 # Words of numbers that are no entries in units of SI, whatever units stand beside them.
 _OTHER_NUMBERS = (
     r"(?i)\b(?:weights?|compliance|flexibility|half|halved|doubled|twice|imperial|cgs|customary|ratios?"
-    rf"|relative|us\s+units)\b|%|\bper\s?cent|\bmass\w*\s+as\s+forces?|{TRANSFORMED}"
+    rf"|relative|us\s+units)\b|%|\bper\s?cent|\bmass\w*\s+as\s+forces?|{TRANSFORMED}|\b[KMC]\^?\(?-1\b"
 )
 
 
@@ -142,22 +142,26 @@ def _stated_factor(path: Path) -> float:
         rest = without_units(line, units)
         # "mass = weight / g" is a mass.
         other = None if re.search(r"(?i)\bmass\w*\s*=", line) else re.search(_OTHER_NUMBERS, rest)
-        is_per_cent = any(one.dimension == "" and one.is_sure for one in units)
+        is_per_cent = any(x.dimension == "" and x.is_sure and not x.numbers for x in units)
         allowed = "entries of stiffness, damping or mass in units"
         require(other is None and not is_per_cent, place, line.strip()[:60], allowed, cure)
-        units = [x for x in units if x.is_sure and (not x.numbers or not _is_value_of_another(x))]
-        is_of_numbers = bool(units) or re.search("(?i)scal|multipl|divi", rest) is not None
+        units = [x for x in units if x.dimension and not (x.numbers and _is_value_of_another(x))]
+        is_of_numbers = (
+            any(x.is_sure for x in units)
+            or re.search(r"(?i)scal|multipl|divi|times|factor|[a-z]/1|[x×*·]\s*\d", rest)
+            is not None
+        )
         has_factor = is_of_numbers and re.search(FACTOR, rest, re.IGNORECASE) is not None
         has_factor |= any(
-            one.numbers not in ((), (1.0,)) and re.search(_IN_UNITS, one.before) for one in units
+            one.is_sure and one.is_multiple and re.search(_IN_UNITS, one.before) for one in units
         )
         require(not has_factor, place, line.strip()[:60], "units without a factor", cure)
         for one in units:
             factor = _metric_factor(one)
             allowed = "units of SI, or kN and t with m"
-            require(factor != 0, place, f"in {one.shown}", allowed, cure)
-            if factor is not None:
-                where = stated if one.numbers in ((), (1.0,)) else unsure
+            require(factor != 0 or not one.is_sure, place, f"in {one.shown}", allowed, cure)
+            if factor:
+                where = unsure if one.is_multiple or not one.is_sure else stated
                 where.append(Stated(factor, one.shown, f"line {row}"))
     found = settled(path.name, "unit", stated)
     taken = found or Stated(1.0, "of SI")
@@ -184,7 +188,7 @@ def _metric_factor(one: Mention) -> float | None:
         # Masses and forces over a length, an area or a volume are loads, densities or pressures.
         is_metric = word.factor in (1.0, 1e3, 1e6, 1e9) and "m-" not in one.dimension
         if "kg" in word.dimension:
-            if not is_metric or power != 1 or factor is not None:
+            if not is_metric or power != 1 or factor not in (None, word.factor):
                 return 0.0
             factor = word.factor
         elif word.factor != 1 or word.dimension not in ("m", "s", "rad"):
@@ -323,16 +327,18 @@ def _read_csv(name: str, text: str) -> Array:
         RefusedError: A row has another text, or another count of numbers than the others.
     """
     require(bool(text.strip()), name, "", ALLOWED)
+    numbers = re.sub("#.*", "", text)  # whose marks count, and not those in comments
     delimiter: str | None = ","
     # Where semicolons separate the cells, a comma can only be a decimal comma. Without any of both,
     # blanks separate them, which NumPy calls None.
-    if ";" in text:
+    if ";" in numbers:
         delimiter = ";"
         text = text.replace(",", ".")
-    elif "," not in text:
+        numbers = numbers.replace(",", ".")
+    elif "," not in numbers:
         delimiter = None
     try:
-        return np.loadtxt(StringIO(text), delimiter=delimiter, ndmin=2)
+        return np.loadtxt(StringIO(numbers), delimiter=delimiter, ndmin=2)
     except ValueError:
         raise _wrong_row(name, text, delimiter) from None
 

@@ -17,7 +17,7 @@ VOLUME = 3
 _SIDES = (
     r"(?i)vox|pix|px|edge|sampling|scale|spac|resol|thick|isotrop|every|step|pitch|kante|schicht"
 )
-_ALONG_Z = r"(?i)slice|layer|section|slab|voxel\W*depth|schicht|tranche|\bz\b"
+_ALONG_Z = r"(?i)slice|layer|section|slab|voxel\W*depth|schicht|tranche|(?<![a-z])z(?![a-z])"
 _PIXEL = r"(?i)pix|px"
 _EXTENT = r"(?i)field\s+of\s+view|\bfov|extent"
 _OTHERS = (
@@ -25,7 +25,7 @@ _OTHERS = (
     r"|pore|radius|filter|aperture|focal|origin|offset|position|corner|cent(?:re|er)"
     r"|crop|wall|core\b|spot|stage"
 )
-_AXIS = r"(?i)(?:(?:^|\W)d?|\bd)([xyz])[\"']?\s*[:=]*\s*$"
+_AXIS = r"(?i)(?:(?:^|[\W_])[dvΔδ]?|\bd)([xyz]{1,3})[\"']?\s*[:=]*\s*$"
 # A number of one axis without a unit.
 _BARE_AXIS = rf"(?i)\bd?([xyz])[\"']?\s*[:=]\s*({NUMBER})(?!\s*[a-zµμ])"
 
@@ -98,10 +98,12 @@ def require_spacing(
         return
     # Lengths of which no word says what they are must be those of the case, or of the volume.
     extents = [side * count for side, count in zip(expected, counts, strict=False)]
-    lengths = [Stated(length, f"of {length:g} m") for length in (*expected, *extents)]
     for own in unsure:
-        settled(name, "voxel", [], own, tolerance=0.01, unsure=lengths)
-    for axis, said in enumerate(lengths[: len(expected)]):
+        is_like = any(math.isclose(own.value, x, rel_tol=0.01) for x in (*expected, *extents))
+        cure = 'say override = ["voxel"] if that is something else'
+        require(is_like, name, f"of a length of {own}", f"voxels of {shown_sides}", cure)
+    for axis, side in enumerate(expected):
+        said = Stated(side, f"of {side:g} m along {'xyz'[axis]}")
         whole = extents[axis] if extents else math.nan
         if not any(math.isclose(x.value, whole, rel_tol=0.01) for x in unsure):
             settled(name, "voxel", [], said, tolerance=0.01, unsure=unsure)
@@ -165,13 +167,16 @@ def _sides_of(
         return
     if re.search(_OTHERS, around) and not is_side:
         return
+    # Beside a magnification, the pixels of a camera are larger.
+    is_of_camera = re.search("(?i)detector|camera|sensor|magnif|binn", around) is not None
+    is_side = is_side and not is_of_camera
     if len(lengths) == 3 and is_side:
         for axis, length in enumerate(lengths):
             yield _Length((axis,), Stated(length, shown))
         return
-    if len(lengths) == 1:
+    if len(lengths) == 1 and not is_of_camera:
         if match := re.search(_AXIS, before):
-            axes = ("xyz".index(match[1].lower()),)
+            axes = tuple("xyz".index(letter) for letter in dict.fromkeys(match[1].lower()))
         elif re.search(_ALONG_Z, around):
             axes = (2,)
         elif re.search(_PIXEL, before):
@@ -184,7 +189,7 @@ def _sides_of(
 
 def unit_in_texts(texts: Iterable[str]) -> str:
     """Return the unit of all lengths that lines state, as "lengths in um"; empty if none does."""
-    announced = re.compile(r"(?i)\bin\W*$|unit")
+    announced = re.compile(r"(?i)\bin\W*$|unit|^\W*(?:comment)?\W*$")
     for text in texts:
         for one in mentions(text):
             if one.dimension == "m" and not one.numbers and announced.search(one.before):

@@ -239,6 +239,13 @@ HEADS = [
     ("motion squared, gal^2, dt .01 s\n", COLUMN, 0.01, None),
     ("micrometers per second squared; 0.01-s intervals\n", COLUMN, 0.01, 1e-6),
     ("<record dt_ms=10 unit=gal>\n", COLUMN, 0.01, 0.01),
+    ("Acceleration multiplied by mass, kN; dt 0.01 s\n", COLUMN, 0.01, None),
+    ("# units ft/s/s; step 1.0e-2\n# 2 Hz high-pass, sampling 100 Hz\n", COLUMN, 0.01, 0.3048),
+    ("t,a\n# in ms and gal\n", (",", 1000), 0.01, 0.01),
+    ("multiply with 9.81 for m/s^2; dt 0.01\n", COLUMN, 0.01, None),
+    ("sensor 1 V = 1 g; data in volts; 100 Hz\n", COLUMN, 0.01, None),
+    ("response spectrum acceleration, g; dt 0.01 s\n", COLUMN, 0.01, None),
+    ("accel. (cgs), tstep .01, f_s = 100 1/s\n", COLUMN, 0.01, 0.01),
 ]
 """Heads with the layout of the numbers, their step in s, and their unit in m/s²; None of others."""
 
