@@ -2,49 +2,25 @@
 
 import io
 import json
-from contextlib import redirect_stderr
+import tomllib
+from contextlib import redirect_stderr, redirect_stdout
+from functools import cache
+from pathlib import Path
 
 from alphacut import main
 
-FRAME = """
-title = "One floor"
-stages = ["envelope"]
-[frame]
-masses = ["[9, 10, 11] t"]
-lengths = "3 m"
-modulus = "[22, 24, 26] GPa"
-second_moment = "1e-5 m^4"
-dampers = "50 N s/m"
-damper_placement = "ground"
-displacements = "10 mm"
-[envelope]
-fuzzy = ["E", "m"]
-alpha = [0, 0.5, 1]
-method = "graph-follower"
-tolerance = "0.1 mm"
-integrator = "exact"
-duration = "2 s"
-step = "0.02 s"
-"""
-CELL = """
-title = "Fibres"
-stages = ["modulus"]
-[radius]
-a1 = 0.3
-a2 = [0.1, 0.2, 0.3]
-a3 = 0.6
-a4 = 0.2
-[cell]
-matrix_modulus = "20 GPa"
-matrix_poisson = 0.3
-inclusion_modulus = "[75, 80, 85] GPa"
-inclusion_poisson = 0.3
-[modulus]
-method = "series"
-plan = "reduced"
-alpha = [0, 1]
-tolerance = 1e-6
-"""
+TABLES = Path(__file__).parent / "case" / "refused"
+"""Base cases with the mistakes that are refused in them, one file each."""
+
+
+@cache
+def table_of(name):
+    """A base case by its name: the text `case`, and the mistakes `refused` in it."""
+    return tomllib.loads((TABLES / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+FRAME = table_of("frame")["case"]
+CELL = table_of("cell")["case"]
 TWO_FLOORS = """
 title = "Two floors <script>alert(1)</script>"
 about = "A frame that asks every question, made by `a <b> command`"
@@ -118,3 +94,12 @@ def two_floors_run(folder, *options):
     case.write_text(TWO_FLOORS, encoding="utf-8")
     assert main(["run", str(case), "--quiet", "--out", str(folder / "out"), *options]) == 0
     return folder / "out"
+
+
+def told_by(*words, status=0):
+    """What a command prints, on both streams; it must end with a status."""
+    told = io.StringIO()
+    with redirect_stdout(told), redirect_stderr(told):
+        ended = main([str(word) for word in words])
+    assert ended == status, told.getvalue()
+    return told.getvalue()

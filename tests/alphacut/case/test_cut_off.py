@@ -2,7 +2,7 @@
 
 import pytest
 
-from alphacut import main
+from tests.alphacut.small import told_by
 
 CASE = """title = "Two matrices of one frame"
 stages = ["envelope"]
@@ -47,14 +47,13 @@ STIFFNESS = [
         (3, 2, "1 unknowns of the files are not named, and so are held: 3.1"),
     ],
 )
-def test_unknowns_of_one_file_alone_are_told(tmp_path, capsys, command, n_mass, n_stiffness, words):
+def test_unknowns_of_one_file_alone_are_told(tmp_path, command, n_mass, n_stiffness, words):
     (tmp_path / "MASS1.mtx").write_text("".join(MASS[:n_mass]))
     (tmp_path / "STIF1.mtx").write_text("".join(STIFFNESS[:n_stiffness]))
     (tmp_path / "case.toml").write_text(CASE)
     arguments = [command, str(tmp_path / "case.toml"), "--quiet"]
     if command == "run":
         arguments += ["--out", str(tmp_path / "out"), "--no-figures"]
-    assert main(arguments) == 0
-    told = capsys.readouterr().err
+    told = told_by(*arguments)
     assert ("unknowns" in told) == bool(words)
     assert words in told

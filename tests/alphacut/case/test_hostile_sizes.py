@@ -5,13 +5,12 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from alphacut import main
 from alphacut.commands.motion_text import modes_document, modes_text
 from alphacut.frame import read_spectrum
 from alphacut.frame.structures.linear import NominalModes
 from alphacut.report.page import render_template
 from tests.alphacut.case.test_cut_off import CASE, MASS, STIFFNESS
-from tests.alphacut.small import FRAME, refusals, written
+from tests.alphacut.small import FRAME, refusals, told_by, written
 from tests.refused import refuses
 
 
@@ -30,7 +29,7 @@ def test_a_key_of_thousands_of_parts_is_refused_before_it_is_parsed(tmp_path):
 
 def test_texts_with_dots_are_no_keys(tmp_path):
     title = "U.S. frame of A.B.C. Co., v. 1.2.3.4"
-    assert main(["check", str(written(tmp_path, FRAME, **{"One floor": title})), "--quiet"]) == 0
+    told_by("check", written(tmp_path, FRAME, **{"One floor": title}), "--quiet")
 
 
 def test_thousands_of_unknown_keys_are_counted_and_not_listed(tmp_path):

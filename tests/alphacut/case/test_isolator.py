@@ -6,32 +6,17 @@ import pytest
 from alphacut.case.content import load
 from alphacut.frame import BilinearIsolator
 from alphacut.frame.dynamics.yielding import YieldingFlow
-from tests.alphacut.small import refusals
+from tests.alphacut.small import table_of
 from tests.refused import refuses
 
-CASE = """
-title = "A floor on isolators"
-stages = ["envelope"]
-[frame]
-masses = ["60 t", "40 t"]
-stiffness = "100 MN/m"
-isolator = { period = "2 s", hardening = 0.2, ISOLATOR }
-damping_ratio = "5 %"
-velocities = "1 m/s"
-OTHERS
-[envelope]
-fuzzy = ["k1"]
-alpha = [0]
-duration = "1 s"
-step = "0.02 s"
-"""
+CASE = table_of("isolators")["case"]
 STRENGTH = 'strength_ratio = "5 %"'
 FACTORS = f"{STRENGTH}, lambda_min = 0.8, lambda_max = 1.3"
 
 
-def written(folder, isolator, others=""):
+def written(folder, isolator):
     path = folder / "case.toml"
-    path.write_text(CASE.replace("ISOLATOR", isolator).replace("OTHERS", others), encoding="utf-8")
+    path.write_text(CASE.replace("ISOLATOR", isolator), encoding="utf-8")
     return path
 
 
@@ -59,21 +44,6 @@ def test_a_linked_factor_of_k1_changes_stiffness_and_strength(tmp_path):
         both = np.array([[factor * k, factor * force]])
         (of_both,) = YieldingFlow(free.model, ("k1", "fy1"), 1.0, 0.02).values(both)
         assert of_one == pytest.approx(of_both, rel=1e-9, abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("isolator", "others", "words"),
-    [
-        ("linked = true", "", "either strength or strength_ratio"),
-        (f'{STRENGTH}, strength = "1 kN"', "", "either strength or strength_ratio"),
-        (f"{STRENGTH}, lambda_min = 1.1", "", "lambda_min"),
-        (STRENGTH, 'yield_force = "1 kN"', "frame.yield_force"),
-        (STRENGTH, 'displacements = ["0 m", "0 m", "0 m"]', "displacements"),
-    ],
-)
-def test_isolators_that_contradict_are_refused(tmp_path, isolator, others, words):
-    (line,) = refusals(written(tmp_path, isolator, others))
-    assert words in line
 
 
 @pytest.mark.parametrize(

@@ -3,11 +3,11 @@
 import re
 from pathlib import Path
 
-from alphacut import main
 from alphacut.case.content import Content
 from alphacut.case.parse import allowed_values, keys_of
 from alphacut.case.structures import with_structures
 from alphacut.frame import METHODS
+from tests.alphacut.small import told_by
 
 CASE = with_structures(Content, built=True)
 ROOT = Path(__file__).parents[3]
@@ -17,10 +17,9 @@ def test_each_key_says_what_it_is():
     assert all(info.description for info in keys_of(CASE).values())
 
 
-def test_the_page_has_the_keys_of_the_models(capfd):
+def test_the_page_has_the_keys_of_the_models():
     """What `make keys` writes into it; every key of the models is there."""
-    assert main(["keys"]) == 0
-    printed = capfd.readouterr().out
+    printed = told_by("keys")
     page = (ROOT / "docs/case-format.md").read_text(encoding="utf-8")
     assert page.partition("follows -->\n\n")[2] == printed
     found = set()
@@ -33,14 +32,12 @@ def test_the_page_has_the_keys_of_the_models(capfd):
     assert found == set(keys_of(CASE))
 
 
-def test_keys_of_one_section_are_printed_and_no_other(capfd):
-    assert main(["keys", "[records]"]) == 0
-    printed = capfd.readouterr().out
+def test_keys_of_one_section_are_printed_and_no_other():
+    printed = told_by("keys", "[records]")
     assert re.findall("^## (.*)", printed, re.MULTILINE) == ["`[records]`", "`[records.spectrum]`"]
     assert "- `unit`: " in printed
     assert 'default "none".' in printed
-    assert main(["keys", "record"]) == 2
-    assert "did you mean records?" in capfd.readouterr().err
+    assert "did you mean records?" in told_by("keys", "record", status=2)
 
 
 def test_allowed_values_of_a_key_are_told_in_words():
@@ -51,9 +48,11 @@ def test_allowed_values_of_a_key_are_told_in_words():
     assert allowed_values(keys["title"]) == ""
 
 
-def test_entries_of_tables_with_free_names_are_changed_and_others_suggested(capfd):
+def test_entries_of_tables_with_free_names_are_changed_and_others_suggested():
     case = "cases/plane-frame.toml"
-    assert main(["check", case, "--set", 'matrices.parameters.Ec="1.2 ± 5 %"']) == 0
-    assert "matrices.parameters.Ec 1.14 … 1.26" in " ".join(capfd.readouterr().out.split())
-    assert main(["check", case, "--set", "matrices.parametrs.Ec=1.2"]) == 2
-    assert "did you mean matrices.parameters?" in capfd.readouterr().err
+    assert "matrices.parameters.Ec 1.14 … 1.26" in " ".join(
+        told_by("check", case, "--set", 'matrices.parameters.Ec="1.2 ± 5 %"').split()
+    )
+    assert "did you mean matrices.parameters?" in told_by(
+        "check", case, "--set", "matrices.parametrs.Ec=1.2", status=2
+    )

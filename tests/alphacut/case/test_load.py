@@ -8,14 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import scipy.io
-import scipy.sparse
 
-from alphacut import main
 from alphacut.case.content import load
-from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope, peaks
+from alphacut.frame import Exact, LinearFlow, StoreyFrame
 from alphacut.fuzzy import Interval, Triangular
-from tests.alphacut.small import CELL, FRAME, refusals, written
+from tests.alphacut.case import files
+from tests.alphacut.small import CELL, FRAME, refusals, table_of, told_by, written
 
 ROOT = Path(__file__).parents[3]
 
@@ -53,79 +51,12 @@ def test_a_cell_is_round_or_an_image(tmp_path):
     assert "modulus.method is series; allowed: auto for this cell" in line
 
 
-WRONG = [  # text in the case, its replacement; key, and what the message says
-    ('"10 mm"', '"10 q"', "frame.displacements[1]", 'unit "q"'),
-    ('"3 m"', '"-3 m"', "frame.lengths[1]", "above 0"),
-    ('"3 m"', "3", "frame.lengths[1]", "the unit is missing"),
-    ("[22, 24, 26]", "[24, 22, 26]", "frame.modulus", "rise"),
-    ("lengths", "lenghts", "frame.lenghts", "did you mean lengths?"),
-    ("[frame]", "[frmae]", "frmae", "unknown section; did you mean frame?"),
-    ('"graph-follower"', '"graph-folower"', "envelope.method", "did you mean graph-follower?"),
-    ('"ground"', '"floor"', "frame.damper_placement", "ground"),
-    ('fuzzy = ["E", "m"]', 'fuzzy = ["E", "n"]', "envelope.fuzzy", "n; allowed"),
-    ('fuzzy = ["E", "m"]', 'fuzzy = ["E", "masses"]', "envelope.fuzzy", "did you mean m?"),
-    ('fuzzy = ["E", "m"]', 'fuzzy = ["E", "E"]', "envelope.fuzzy", "each name once"),
-    ("[0, 0.5, 1]", "[0.5, 0, 1]", "envelope.alpha", "rising order"),
-    ("[0, 0.5, 1]", "0.5", "envelope.alpha", "write alpha = [0.5]"),
-    ('"3 m"', '"2 kg"', "frame.lengths[1]", '"kg" is a unit of mass, and no unit of length'),
-    ("[0, 0.5, 1]", "[0, 2]", "envelope.alpha[2]", "up to 1"),
-    ('duration = "2 s"', "", "envelope.duration", "is missing"),
-    ('step = "0.02 s"', 'step = "0.03 s"', "envelope.duration", "whole multiples"),
-    ('displacements = "10 mm"', "", "frame.displacements", "nothing moves the frame"),
-    ('step = "0.02 s"', 'step = "20 s"', "envelope.duration", "envelope.step is longer, 20 s"),
-    ('step = "0.02 s"', "step = 0.02 s", "", 'quantities stand in quotes, as "0.01 s"'),
-    ('stages = ["envelope"]', "stages = envelope", "", "texts stand in quotes"),
-    ('tolerance = "0.1 mm"', 'tolerance = "1 kg"', "envelope.tolerance", "a fraction"),
-    ('second_moment = "1e-5 m^4"', "", "frame.second_moment", "or stiffness"),
-    ('stages = ["envelope"]', 'stages = ["modulus"]', "radius", "stage modulus needs"),
-    ('stages = ["envelope"]', "stages = []", "stages", "one entry"),
-    ('masses = ["[9, 10, 11] t"]', "masses = []", "masses", "one entry or more"),
-    ('"[9, 10, 11] t"', '"9 t", "9 t"', "envelope.fuzzy", "fuzzy"),
-    ("title", "tilte", "tilte", "did you mean title?"),
-    ("[envelope]", "[envelope]\ncertify = 3", "envelope.certify", "is an unknown key"),
-    ('"1e-5 m^4"', '"1e-5 m^4" "x"', "", "is not TOML"),
-    ("[envelope]", "outputs = []\n[envelope]", "frame.outputs", "one entry or more"),
-    (
-        "[envelope]",
-        '[decision]\nlimits = ["mean q1 <= 1 mm"]\n[envelope]',
-        "decision.limits",
-        "[records]",
-    ),
-]
-
-
-@pytest.mark.parametrize(("old", "new", "key", "words"), WRONG)
-def test_what_is_wrong_is_said_with_its_key(tmp_path, old, new, key, words):
-    assert old in FRAME
-    first, *_ = problems(tmp_path, FRAME.replace(old, new))
-    assert key in first
-    assert words in first
-    assert len(first) <= 1010
-
-
 def test_all_problems_come_at_once_with_their_file(tmp_path):
     text = FRAME.replace("10 mm", "10 q").replace("3 m", "3 q").replace('"2 s"', '"2 q"')
     every = problems(tmp_path, text)
     keys = "frame.lengths[1]", "frame.displacements[1]", "envelope.duration"
     for key, line in zip(keys, every, strict=True):
         assert re.match(rf"alphacut: {tmp_path}/case.toml(, line \d+)?: {re.escape(key)} is ", line)
-
-
-CELLS = [
-    ("a3 = 0.6", "a3 = 1.6", "radius.a3"),
-    ("a2 = [0.1, 0.2, 0.3]", "a2 = 9", "radius"),
-    ("a2 = [0.1, 0.2, 0.3]\n", "", "radius.a2"),
-    ("matrix_poisson = 0.3", "matrix_poisson = 0.5", "cell.matrix_poisson"),
-    ('method = "series"', 'method = "prism"\n[cell2]\n', "cell2"),
-    ('"series"', '"slices"', "modulus.method"),
-    ("a1 = 0.3\na2 = [0.1, 0.2, 0.3]\na3 = 0.6\na4 = 0.2", "theta = [-3, 3]", "radius.a1"),
-]
-
-
-@pytest.mark.parametrize(("old", "new", "key"), CELLS)
-def test_what_is_wrong_with_a_cell(tmp_path, old, new, key):
-    text = CELL.replace("[cell]", '[cell]\nparticles = "spheres"') if "slices" in new else CELL
-    assert any(f" {key} is " in line for line in problems(tmp_path, text.replace(old, new)))
 
 
 FRACTION = """
@@ -280,46 +211,13 @@ def test_damage_states_take_the_place_of_limits_and_rise(tmp_path):
     assert "twice.toml" in line
 
 
-MATRICES = """
-title = "Two storeys as matrices"
-stages = ["envelope"]
-[matrices]
-unknowns = ["1.x", "2.x"]
-mass = [["m", "masses.csv"]]
-stiffness = [["12*E*I*l^-3", "lower.mtx"], ["2*k2", "upper.npz:springs"]]
-damping_ratio = "2 %"
-direction = "x"
-accelerogram = "record.csv"
-[matrices.parameters]
-m = "20 t"
-E = "30 GPa ± 5 %"
-I = "2e-4 m^4"
-l = "3 m"
-k2 = "10 MN/m"
-[matrices.outputs]
-roof = { row = { "2.x" = 1.0 } }
-shear = { row = { "1.x" = 1.0 }, unit = "N", factor = "12*E*I*l^-3" }
-[envelope]
-fuzzy = ["E"]
-alpha = [0, 1]
-duration = "1 s"
-step = "0.02 s"
-"""
+MATRICES = table_of("matrices")["case"]
+FORCES = table_of("forces")["case"]
 
 
 @pytest.fixture
 def folder(tmp_path):
-    np.savetxt(tmp_path / "masses.csv", np.diag([1.0, 0.5]), delimiter=",")
-    scipy.io.mmwrite(tmp_path / "lower.mtx", scipy.sparse.coo_matrix([[1.0, 0.0], [0.0, 0.0]]))
-    springs = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    np.savez(tmp_path / "upper.npz", springs=springs, other=np.eye(2))
-    (tmp_path / "short.csv").write_text("1,0\n")
-    np.save(tmp_path / "diagonal.npy", np.ones(2))
-    (tmp_path / "upper.csv").write_text("9,3\n0,4\n")
-    np.save(tmp_path / "zeros.npy", np.zeros((2, 2)))
-    times = 0.02 * np.arange(40)
-    rows = [f"{t:.2f},{np.sin(9 * t):.8f}" for t in times]
-    (tmp_path / "record.csv").write_text("time [s],acceleration [m/s^2]\n" + "\n".join(rows))
+    files.matrices(tmp_path)
     return tmp_path
 
 
@@ -385,54 +283,6 @@ def test_limits_are_in_the_units_of_the_outputs_of_matrices(folder):
     assert "decision.limits is q1 <= 10 mm; allowed: acceleration" in line
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ('"lower.mtx"', '"nothing.mtx"', "a file, from the folder"),
-        ("upper.npz:springs", "upper.npz", "one of springs, other"),
-        ("12*E*I*l^-3", "sin(E)", "a product of powers"),
-        ("12*E*I*l^-3", "E*J", "factor"),
-        ('row = { "2.x"', 'row = { "9.x"', "matrices.outputs.roof.row"),
-        ('direction = "x"', 'direction = "y"', "matrices.direction"),
-        ('.x"', '"', "name the unknowns NODE.DIRECTION, as 1.x"),
-        ('direction = "x"', 'direction = ["x", "y"]', "of a list make a table"),
-        ('"1.x", "2.x"]\nmass', '"1.x", "2.x", "3.x"]\nmass', "of shape"),
-        ('"lower.mtx"', '"short.csv"', "short.csv is of shape (1, 2); allowed: (2, 2); the case"),
-        ('"lower.mtx"', '"diagonal.npy"', "of a diagonal make a matrix, by numpy.diag"),
-        ('"lower.mtx"', '"upper.csv"', "upper.csv is not symmetric: [1.x, 2.x] is 3, [2.x, 1.x]"),
-        ('"lower.mtx"', '"zeros.npy"', "zeros.npy is zeros throughout"),
-        ('m = "20 t"', 'm = "20 parsec fuzz"', "a quantity"),
-        (
-            "roof =",
-            '"roof drift" =',
-            "matrices.outputs is 'roof drift'; allowed: names of a letter",
-        ),
-        ("roof =", '"roof\\u001b[31m" =', "matrices.outputs is 'roof\\x1b[31m'"),
-        ("roof =", '"2nd" =', "matrices.outputs is '2nd'"),
-        ("roof =", '"" =', "matrices.outputs is ''"),
-        ('m = "20 t"', 'm = "20 t"\n"k 3" = 1', "matrices.parameters is 'k 3'"),
-        ('unit = "N"', 'unit = "N\\u001b[2J"', "unit of shear is 'N\\x1b[2J'"),
-        ('unit = "N"', 'unit = "kN"', "unit is kN; allowed: SI units, as m, N or N*m; write N;"),
-        (ROOF, "{ }", "matrices.outputs.roof.row is missing"),
-        (ROOF, '{ lower = "1.x" }', "matrices.outputs.roof.row is missing; allowed: entries of"),
-        (ROOF, ROOF[:-1] + ', upper = "2.x" }', "matrices.outputs.roof.row is beside upper"),
-        (ROOF, ROOF[:-1] + ', height = "3 m" }', "matrices.outputs.roof.height is without upper"),
-        (ROOF, '{ upper = "2.x", lower = "2.x" }', "matrices.outputs.roof.lower is 2.x; allowed"),
-        (ROOF, '{ upper = "2.x", lower = "3.x" }', "roof.upper, lower is 3.x; allowed: unknowns"),
-        (ROOF, '{ upper = "2.x", height = "0 m" }', "roof.height is 0 m; allowed: length above 0"),
-        (ROOF, ROOF[:-1] + ', of = "jerk" }', 'matrices.outputs.roof.of is "jerk"; allowed: '),
-        (
-            'unit = "N", factor',
-            'of = "acceleration", factor',
-            "matrices: observed: shear is accelerations times a factor; allowed: accelerations",
-        ),
-    ],
-)
-def test_what_makes_no_structure_is_one_line(folder, old, new, message):
-    lines = refusals(changed(folder, old, new))
-    assert any(message in line for line in lines), lines
-
-
 def test_unknowns_come_with_the_file_that_names_them(folder):
     """Those that Abaqus holds are left out, and matrices come in the order of the names."""
     stiffness = "5,1, 5,1, 1.0e+36\n1,1, 1,1, 1.0\n2,1, 1,1, -1.0\n2,1, 2,1, 1.0\n"
@@ -479,38 +329,9 @@ def test_a_limit_is_in_the_unit_of_its_output(folder, limit, words):
         assert found.value == 0.04
 
 
-WIND = "time [s],force [kN]\n0,2\n0.5,-4\n1,3\n"
-IN_THE_WIND = """
-title = "Two floors in the wind"
-stages = ["envelope"]
-[frame]
-masses = ["10 t", "8 t"]
-stiffness = "9 MN/m"
-damping_ratio = "2 %"
-[[force]]
-history = "wind.csv, static"
-amplitude = { 1 = "1", 2 = "1 ± 10 %" }
-[[force]]
-history = "harmonic, 2 Hz, 90 deg, from 0.3 s"
-amplitude = { 2 = "[1, 2, 3] kN" }
-[[force]]
-history = "impulse"
-amplitude = { 1 = "0.4 kN s" }
-[envelope]
-fuzzy = ["F", "F2_2"]
-alpha = [0, 1]
-duration = "1 s"
-step = "0.02 s"
-"""
-
-
-def in_the_wind(folder, **changes):
-    (folder / "wind.csv").write_text(WIND, encoding="utf-8")
-    return written(folder, IN_THE_WIND, **changes)
-
-
 def test_amplitudes_are_parameters_and_courses_have_their_files_samples(tmp_path):
-    structure = load(in_the_wind(tmp_path)).content.structure
+    files.wind(tmp_path)
+    structure = load(written(tmp_path, FORCES)).content.structure
     assert structure.inputs(("F",)).keys() == {"F2", "F2_2"}
     numbers = {name: structure.numbers[name].support for name in structure.model.force_names}
     assert numbers == {"F1": (1.0, 1.0), "F2": (0.9, 1.1), "F2_2": (1e3, 3e3), "J1": (4e2, 4e2)}
@@ -545,52 +366,11 @@ step = "0.01 s"
 @pytest.mark.parametrize(
     "frequency", ["1.5 Hz", "9.42477796076938 rad/s", "90 rpm", "540 deg/s", "1.5 turn/s"]
 )
-def test_a_frequency_counts_turns_in_whatever_unit_it_is_given(tmp_path, capsys, frequency):
+def test_a_frequency_counts_turns_in_whatever_unit_it_is_given(tmp_path, frequency):
     case = written(tmp_path, MACHINE, **{"1.5 Hz": frequency})
-    assert main(["check", str(case)]) == 0
-    assert "1.5 Hz, period 0.6667 s" in capsys.readouterr().out
+    assert "1.5 Hz, period 0.6667 s" in told_by("check", case)
     (machine,) = load(case).content.structure.model.loads
     assert machine.history.frequency == pytest.approx(3 * np.pi, rel=1e-14)
-
-
-def test_bounds_under_a_machine_in_turns_per_minute_hold_the_largest_displacement(tmp_path):
-    structure = load(written(tmp_path, MACHINE, **{"1.5 Hz": "90 rpm"})).content.structure
-    found = envelope(
-        structure.model, structure.inputs(("k1",)), alpha=(1,), duration=6.0, step=0.01
-    )
-    # q(t) = F/(m (ω² - Ω²)) (sin Ω t - Ω/ω sin ω t), without damping, at rest at t = 0
-    mass, force, turning, time = 50e3, 10e3, 2 * np.pi * 1.5, np.linspace(0.0, 6.0, 60001)
-    omega = np.sqrt(np.linspace(9.9e6, 10.1e6, 41) / mass)[:, None]
-    amplitude = force / (mass * (omega**2 - turning**2))
-    shape = np.sin(turning * time) - turning / omega * np.sin(omega * time)
-    largest = np.abs(amplitude * shape).max()
-    assert largest == pytest.approx(3.0055e-3, rel=1e-4)
-    assert largest <= peaks(found)["q1"].upper[0] <= 3.0095e-3
-    attained = np.maximum(found.inner.upper, -found.inner.lower).max()
-    assert 3.002e-3 <= attained <= largest
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ('{ 2 = "[1, 2, 3] kN" }', '{ 3 = "1 kN" }', "force.amplitude is 3"),
-        ('"impulse"', '"drum"', "a file, from the folder"),
-        ('"impulse"', '"impulse, from 1 s"', "force[3].history is impulse, from 1 s"),
-        ('"0.4 kN s"', '"0.4 kN"', "force.amplitude.1 is N"),
-        (", 2 Hz, 90 deg", "", "force[2].history is harmonic"),
-        ("2 Hz", "2 m", "2 m"),
-        ("2 Hz", "2 s", "no unit of frequency"),
-        ("from 0.3 s", "static", "force[2].history"),
-        ("from 0.3 s", "from -1 s", "force[2]"),
-        ("from 0.3 s", "from 1 s", "force[2].history is from 1 s"),  # at the end of the motion
-        ('"wind.csv, static"', '"case.toml"', "case.toml, line"),
-        ('"1 ± 10 %"', '"3 lb"', "3 lb; allowed: a force"),
-        ('{ 1 = "0.4 kN s" }', "{}", "one floor or more"),
-    ],
-)
-def test_what_is_wrong_with_a_force_is_said_in_one_line(tmp_path, old, new, words):
-    (line,) = refusals(in_the_wind(tmp_path, **{old: new}))
-    assert words in line
 
 
 @pytest.mark.parametrize(
@@ -604,5 +384,5 @@ def test_what_is_wrong_with_a_force_is_said_in_one_line(tmp_path, old, new, word
 )
 def test_files_that_hold_no_force_are_refused_by_their_line(tmp_path, text, words):
     (tmp_path / "wind.csv").write_text(text, encoding="utf-8")
-    (line,) = refusals(written(tmp_path, IN_THE_WIND))
+    (line,) = refusals(written(tmp_path, FORCES))
     assert words in line

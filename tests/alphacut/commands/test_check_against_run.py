@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from alphacut import main
-from tests.alphacut.small import CELL, FRAME, written
+from tests.alphacut.small import CELL, FRAME, told_by, written
 
 QUESTIONS = """
 [tolerances]
@@ -137,19 +137,16 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("kind", "change", "key"), [(k, *v) for k, v in REFUSED.items()])
-def test_check_refuses_what_run_would(place, capfd, kind, change, key):
+def test_check_refuses_what_run_would(place, kind, change, key):
     words = [str(written(place, TEXTS[kind])), "--set", change]
-    assert main(["check", *words]) == 2
-    assert key in capfd.readouterr().err
+    assert key in told_by("check", *words, status=2)
 
 
-def test_a_record_longer_than_the_motion_is_said(place, capfd):
+def test_a_record_longer_than_the_motion_is_said(place):
     words = [str(written(place, FRAME)), "--set", "frame.accelerogram=record.csv"]
     sentence = "the record lasts 5.9 s, and the motion is computed for 2 s"
-    assert main(["check", *words]) == 0
-    assert sentence in capfd.readouterr().out
-    assert main(["run", *words, "--no-figures", "--quiet", f"--out={place}/out"]) == 0
-    assert sentence in capfd.readouterr().err
+    assert sentence in told_by("check", *words)
+    assert sentence in told_by("run", *words, "--no-figures", "--quiet", f"--out={place}/out")
 
 
 EACH = 60

@@ -1,11 +1,14 @@
 """Commands: what they print, how they end, and that nothing is left where they refuse."""
 
+import io
 import os
 import re
 import signal
 import subprocess
 import sys
 import time
+import tomllib
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,22 +21,23 @@ from alphacut.frame.verification import self_test
 from alphacut.frame.verification.self_test import with_motions_tested
 from alphacut.fuzzy import FailedError, RefusedError
 from alphacut.io.results import Listed, ResultsFolder
-from tests.alphacut.small import CELL, summary_of, written
+from tests.alphacut.small import CELL, summary_of, told_by, written
 
 CASES = Path(__file__).parents[3] / "cases"
 RUN = [sys.executable, "-m", "alphacut"]
 
 
-def spoken(capfd, *words):
+def spoken(*words):
     """Status, standard output and standard error of a command in this process."""
-    status = main([str(word) for word in words])
-    out, err = capfd.readouterr()
-    return status, out, err
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        status = main([str(word) for word in words])
+    return status, out.getvalue(), err.getvalue()
 
 
-def test_a_run_prints_a_table_and_leaves_its_files(tmp_path, capfd):
+def test_a_run_prints_a_table_and_leaves_its_files(tmp_path):
     case, folder = written(tmp_path), tmp_path / "out"
-    status, out, err = spoken(capfd, "run", case, "--out", folder, "--no-figures")
+    status, out, err = spoken("run", case, "--out", folder, "--no-figures")
     assert status == 0
     assert len(out.splitlines()) <= 20
     assert max(map(len, out.splitlines())) <= 80
@@ -44,7 +48,7 @@ def test_a_run_prints_a_table_and_leaves_its_files(tmp_path, capfd):
     assert {"envelope_all.nc", "summary.json"} <= {path.name for path in folder.iterdir()}
 
 
-def test_a_step_that_widens_a_bound_is_foreseen_and_said(tmp_path, capfd):
+def test_a_step_that_widens_a_bound_is_foreseen_and_said(tmp_path):
     case, folder = written(tmp_path), tmp_path / "out"
     given = (
         "--set=frame.outputs=['a1']",
@@ -53,8 +57,8 @@ def test_a_step_that_widens_a_bound_is_foreseen_and_said(tmp_path, capfd):
     )
     for step in (0.1, 0.05):
         words = (case, *given, f"--set=envelope.step={step} s")
-        foreseen = spoken(capfd, "check", *words)[1]
-        told = " ".join(spoken(capfd, "run", *words, "--no-figures", "--out", folder)[1].split())
+        foreseen = spoken("check", *words)[1]
+        told = " ".join(spoken("run", *words, "--no-figures", "--out", folder)[1].split())
         peak = summary_of(folder)["envelopes"]["all"]["peak"]["a1"]
         apart = f"time nodes {step:g} s apart"
         added = re.search(rf"a1: between {apart} the .* may add (.*)% to its peak", foreseen)
@@ -67,16 +71,16 @@ def test_a_step_that_widens_a_bound_is_foreseen_and_said(tmp_path, capfd):
         assert "would give" not in told
 
 
-def test_check_prints_what_was_read(tmp_path, capfd):
-    status, out, _ = spoken(capfd, "check", written(tmp_path))
+def test_check_prints_what_was_read(tmp_path):
+    status, out, _ = spoken("check", written(tmp_path))
     assert status == 0
     assert "first natural period" in out
     assert "unusual" not in out
     soft = "--set=frame.modulus=[22, 24, 26] kPa"
-    assert "unusual period" in spoken(capfd, "check", written(tmp_path), soft)[1]
-    tiny = spoken(capfd, "check", written(tmp_path), "--set=frame.modulus=[22, 24, 26] Pa")[1]
+    assert "unusual period" in spoken("check", written(tmp_path), soft)[1]
+    tiny = spoken("check", written(tmp_path), "--set=frame.modulus=[22, 24, 26] Pa")[1]
     assert "warning: frame.modulus is 22.00 Pa" in tiny
-    quiet = spoken(capfd, "check", written(tmp_path), soft, "--quiet")
+    quiet = spoken("check", written(tmp_path), soft, "--quiet")
     assert quiet[1] == ""
     assert "unusual period" in quiet[2]
     assert "22.00 GPa … 24.00 GPa … 26.00 GPa  triangle" in out
@@ -89,12 +93,12 @@ def test_check_prints_what_was_read(tmp_path, capfd):
                         "matrices.mass[1] 1 × matrix", "matrices.parameters.m1 60000 kg crisp"],
     }  # fmt: skip
     for name, lines in read.items():
-        words = " ".join(spoken(capfd, "check", CASES / f"{name}.toml")[1].split())
+        words = " ".join(spoken("check", CASES / f"{name}.toml")[1].split())
         assert all(line in words for line in lines), words
 
 
-def test_a_unit_that_may_be_wrong_is_told_before_what_is_refused(tmp_path, capfd):
-    stiff = spoken(capfd, "check", CASES / "building.toml", "--set=frame.second_moment='3e5 m^4'")
+def test_a_unit_that_may_be_wrong_is_told_before_what_is_refused(tmp_path):
+    stiff = spoken("check", CASES / "building.toml", "--set=frame.second_moment='3e5 m^4'")
     assert stiff[0] == 2
     doubt, *_, refusal = stiff[2].splitlines()
     assert "frame.second_moment is 300000 m^4, which is unusual: is its unit right?" in doubt
@@ -102,7 +106,7 @@ def test_a_unit_that_may_be_wrong_is_told_before_what_is_refused(tmp_path, capfd
 
 
 def test_a_material_that_is_not_found_hides_neither_doubts_nor_what_is_refused(
-    tmp_path, capfd, monkeypatch
+    tmp_path, monkeypatch
 ):
     def refused(content):
         raise RefusedError("mesh.file", "damaged", "a mesh")
@@ -113,65 +117,29 @@ def test_a_material_that_is_not_found_hides_neither_doubts_nor_what_is_refused(
     monkeypatch.setattr(required, "require_runnable", refused)
     monkeypatch.setattr(case_text, "foreseen_structure", failed)
     tiny = "--set=frame.modulus=[22, 24, 26] Pa"
-    status, _, err = spoken(capfd, "check", written(tmp_path), tiny)
+    status, _, err = spoken("check", written(tmp_path), tiny)
     assert status == 2
     assert "frame.modulus is 22.00 Pa" in err
     assert err.splitlines()[-1].endswith("mesh.file is damaged; allowed: a mesh")
 
 
-def test_a_limit_beyond_all_structures_is_doubted(capfd):
+def test_a_limit_beyond_all_structures_is_doubted():
     limits = "--set=decision.limits=['roof <= 40 m', 'moment <= 350 kN m']"
-    status, out, _ = spoken(capfd, "check", CASES / "plane-frame.toml", limits)
+    status, out, _ = spoken("check", CASES / "plane-frame.toml", limits)
     assert status == 0
     assert out.count("is more than structures reach") == 1
     assert "decision.limits: roof <= 40 m is more than structures reach" in out
 
 
 REFUSED = [
-    (
-        "cell {cases}/composite.toml",
-        "cell is an image; allowed: a section [cell] with a particle; run",
-    ),
-    ("rnu case.toml", "COMMAND is rnu; allowed: run, check"),
-    ("run", "CASE is missing; see alphacut run --help"),
-    ("run case.toml --quiet=3", "--quiet is refused: ignored explicit argument '3'"),
-    ("run case.toml --out", "value of --out is missing"),
-    ("run case.toml --quik", "option is --quik"),
-    ("run case.toml more.toml", "option is more.toml"),
-    ("run case.toml --workers 0", "a whole number 1 or more"),
-    ("run case.toml --workers two", "--workers is two; allowed: whole numbers"),
-    ("run none.toml", "no such file"),
-    ("run .", "is a directory"),
-    ("run case.toml --out case.toml", "the name of a folder"),
-    ("run case.toml --out /proc/none", "nothing can be written"),
-    ("modulus case.toml", "a section [cell]"),
-    ("run {cases}/composite.toml --device cuda", "device is cuda ("),
-    ("run case.toml --device cuda", "--device is cuda; allowed: cpu for a case without"),
-    ('check {cases}/composite.toml --set cell.modulus=["1 GPa","0 GPa"]', "for a frame"),
-    ('check {cases}/tomogram.toml --set cell.modulus=["1 GPa","rigid"]', "cell.loss"),
-    ('check {cases}/composite.toml --set cell.modulus=["0 GPa","rigid"]', "neither a pore nor"),
-    ("identify case.toml", "sections [identify]"),
-    ("microstructure case.toml", "[microstructure]"),
-    ("report none", "without summary.json"),
-    ("report none nowhere", "without summary.json"),
-    ("verify none", "allowed: results of a run with an envelope"),
-    ("check case.toml --set frame.masses=[]", "frame.masses is []; allowed: one entry or more"),
-    ("check case.toml --set frame.masses", "frame.masses, without a value; allowed: KEY=VALUE"),
-    ("check case.toml --set frame.masses=", "frame.masses[1] is empty; allowed: mass above 0"),
-    ("check case.toml -rve_ksp_rtol 1e-9", "-rve_ksp_rtol"),
-    ("run case.toml -rve_ksp_rtol 1e-9", "method prism"),
-    ("run case.toml -options_file none.txt", "none.txt is no such file"),
-    ("run case.toml -options_file", "option is -options_file"),
-    ("check case.toml --set frame.masses=[1_0] t", "does not begin with a number"),
+    *tomllib.loads(Path(__file__).with_name("refused.toml").read_text(encoding="utf-8"))["refused"],
     ("check case.toml --set frame.lengths=" + "[" * 3000, "too long"),
-    ("check case.toml --set frame.lengths=1e308 mm", "magnitudes"),
     ("check case.toml --set frame.lengths=" + "x" * 100_000, "frame.lengths"),
-    ("check case.toml --set frame.lengths=\u001b[31m3 m", "frame.lengths"),
 ]
 
 
 @pytest.mark.parametrize(("line", "words"), REFUSED, ids=[line[:40] for line, _ in REFUSED])
-def test_bad_input_is_one_line_and_status_2(tmp_path, monkeypatch, capfd, line, words):
+def test_bad_input_is_one_line_and_status_2(tmp_path, monkeypatch, line, words):
     monkeypatch.chdir(tmp_path)
     written(tmp_path)
     command, *options = line.replace("{cases}", str(CASES)).split(" --", 1)
@@ -179,7 +147,7 @@ def test_bad_input_is_one_line_and_status_2(tmp_path, monkeypatch, capfd, line, 
     for option in options[0].split(" --") if options else ():
         name, _, value = option.partition(" ")
         arguments += [f"--{name}", *([value] if value else [])]
-    status, out, err = spoken(capfd, *arguments)
+    status, out, err = spoken(*arguments)
     assert (status, out) == (2, "")
     assert words in err
     assert len(err.splitlines()) == 1
@@ -197,29 +165,29 @@ def test_a_file_may_hold_options_of_petsc_and_help_names_them(tmp_path, capfd):
     assert "-rve_ksp_type gmres" in capfd.readouterr().out
 
 
-def test_debug_shows_the_traceback_and_what_is_done(tmp_path, capfd):
+def test_debug_shows_the_traceback_and_what_is_done(tmp_path):
     case, missing = written(tmp_path), tmp_path / "missing.toml"
-    status, _, err = spoken(capfd, "check", missing)
+    status, _, err = spoken("check", missing)
     assert (status, len(err.splitlines())) == (2, 1)
-    status, _, err = spoken(capfd, "check", missing, "--debug")
+    status, _, err = spoken("check", missing, "--debug")
     assert status == 2
     assert "Traceback" in err
     assert str(missing) in err.splitlines()[-1]
     words = ("run", case, "--out", tmp_path / "out", "--no-figures", "--quiet")
-    assert "stage envelope_all is computed" in spoken(capfd, *words, "--debug")[2]
-    assert "stage" not in spoken(capfd, *words)[2]
+    assert "stage envelope_all is computed" in spoken(*words, "--debug")[2]
+    assert "stage" not in spoken(*words)[2]
 
 
 @pytest.mark.parametrize(
     ("method", "integrator", "status"), [("auto", "exact", 1), ("graph-follower", "midpoint", 0)]
 )
 def test_a_tolerance_that_is_missed_fails_but_for_a_graph_follower(
-    tmp_path, capfd, method, integrator, status
+    tmp_path, method, integrator, status
 ):
     changes = {'"0.1 mm"': '"1e-20 mm"', '"exact"': f'"{integrator}"', "graph-follower": method}
     changes |= {'"2 s"': '"0.1 s"', "[0, 0.5, 1]": "[0]"}
     case = written(tmp_path, **changes)
-    code, _, err = spoken(capfd, "run", case, "--no-figures", f"--out={tmp_path}/out")
+    code, _, err = spoken("run", case, "--no-figures", f"--out={tmp_path}/out")
     assert code == status
     assert "the case allows" in err
 
@@ -256,18 +224,14 @@ def proved(case, folder):
     return main(["run", str(case), "--out", str(folder), "--no-figures", "--quiet", *PROOF])
 
 
-def test_what_a_run_stored_is_verified_and_a_narrower_envelope_contradicted(
-    tmp_path, capfd, monkeypatch
-):
+def test_what_a_run_stored_is_verified_and_a_narrower_envelope_contradicted(tmp_path, monkeypatch):
     folder = tmp_path / "out"
     assert proved(written(tmp_path), folder) == 0
     files = sorted(folder.iterdir())
-    assert main(["verify", str(folder)]) == 0
-    assert "exact motions agree with what is guaranteed (guaranteed)" in capfd.readouterr().out
+    assert "exact motions agree with what is guaranteed (guaranteed)" in told_by("verify", folder)
     stored = verify.envelope_of
     monkeypatch.setattr(verify, "envelope_of", lambda data: narrower(stored(data)))
-    assert main(["verify", str(folder)]) == 1
-    assert "the proof is wrong: q1 at t = " in capfd.readouterr().err
+    assert "the proof is wrong: q1 at t = " in told_by("verify", folder, status=1)
     assert sorted(folder.iterdir()) == files
 
 
@@ -279,26 +243,24 @@ def test_a_contradiction_ends_a_run(tmp_path, capfd, monkeypatch):
     assert "Traceback" not in err
 
 
-def test_an_envelope_around_which_bounds_are_proved_is_not_called_guaranteed(tmp_path, capfd):
+def test_an_envelope_around_which_bounds_are_proved_is_not_called_guaranteed(tmp_path):
     words = ["--set", "frame.outputs=['q1']", "--set", "envelope.fuzzy=['E', 'm']"]
     folder = str(tmp_path / "out")
-    assert main(["run", str(written(tmp_path)), "--out", folder, "--no-figures", *words]) == 0
-    told = capfd.readouterr().out
+    told = told_by("run", written(tmp_path), "--out", folder, "--no-figures", *words)
     assert "guaranteed" not in told
     assert "exact motions by another algorithm lie in the wider bounds that are proved" in told
-    assert main(["verify", folder]) == 0
-    told = capfd.readouterr().out
+    told = told_by("verify", folder)
     assert "exact motions lie in the wider bounds that are proved (estimated)" in told
 
 
-def test_peaks_that_a_question_had_proved_are_not_called_unproved(shipped_run, capfd):
+def test_peaks_that_a_question_had_proved_are_not_called_unproved(shipped_run):
     folder = shipped_run("laboratory-frame")
-    assert main(["verify", str(folder)]) == 0
-    assert "its guaranteed peaks were tested by the run" in capfd.readouterr().out
+    assert "its guaranteed peaks were tested by the run" in told_by("verify", folder)
 
 
-def test_a_suite_says_what_it_stores(tmp_path, capfd):
+def test_a_suite_says_what_it_stores(tmp_path):
     (tmp_path / "record_one.json").write_text("{}")
     ResultsFolder(tmp_path).add_to_list({"record_one.json": Listed("", "")})
-    assert main(["verify", str(tmp_path)]) == 2
-    assert "of a suite, whose peaks the run tested as it proved them" in capfd.readouterr().err
+    assert "of a suite, whose peaks the run tested as it proved them" in told_by(
+        "verify", tmp_path, status=2
+    )

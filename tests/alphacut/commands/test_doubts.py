@@ -4,7 +4,7 @@ import pytest
 
 from alphacut import main
 from tests.alphacut.small import FRAME as ONE_FLOOR
-from tests.alphacut.small import written
+from tests.alphacut.small import told_by, written
 
 FRAME = """
 title = "Two storeys"
@@ -25,9 +25,12 @@ step = "2 ms"
 RATIO = 'damping_ratio = "3 %"'
 
 
-def warnings_of(folder, capfd, text):
-    assert main(["check", str(written(folder, text))]) == 0
-    return [line for line in capfd.readouterr().out.splitlines() if line.startswith("warning: ")]
+def warnings_of(folder, text):
+    return [
+        line
+        for line in told_by("check", written(folder, text)).splitlines()
+        if line.startswith("warning: ")
+    ]
 
 
 @pytest.mark.parametrize(
@@ -40,9 +43,9 @@ def warnings_of(folder, capfd, text):
         (RATIO, RATIO + '\ngravity = "9.81 g"', 'frame.gravity is 96.2032 m/s^2: write "1 g"'),
     ],
 )
-def test_a_size_that_betrays_a_wrong_unit_is_doubted(tmp_path, capfd, old, new, doubt):
-    assert warnings_of(tmp_path, capfd, FRAME) == []
-    (warning, *_) = warnings_of(tmp_path, capfd, FRAME.replace(old, new))
+def test_a_size_that_betrays_a_wrong_unit_is_doubted(tmp_path, old, new, doubt):
+    assert warnings_of(tmp_path, FRAME) == []
+    (warning, *_) = warnings_of(tmp_path, FRAME.replace(old, new))
     assert doubt in warning
 
 

@@ -7,9 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from alphacut import main
-from alphacut.io.quantity import parse_fuzzy
-from tests.alphacut.small import written
+from tests.alphacut.small import told_by, written
 
 ROOT = Path(__file__).parents[3]
 
@@ -30,31 +28,12 @@ def test_an_answer_that_cannot_be_written_is_one_line(tmp_path, redirection, wor
     assert words in ended.stderr
 
 
-def test_a_pipe_is_no_folder_of_results(tmp_path, capsys):
+def test_a_pipe_is_no_folder_of_results(tmp_path):
     case = written(tmp_path)
     os.mkfifo(tmp_path / "pipe")
-    assert main(["run", str(case), "--out", str(tmp_path / "pipe")]) == 2
-    told = capsys.readouterr().err
+    told = told_by("run", case, "--out", tmp_path / "pipe", status=2)
     assert "--out" in told
     assert "the name of a folder" in told
-
-
-@pytest.mark.parametrize("unit", ["t,,,,", "t,", "t;", "t !", "t..", "t.", "t @", "t=", "t&"])
-def test_a_unit_with_other_characters_is_no_unit(unit):
-    with pytest.raises(ValueError, match="unit"):
-        parse_fuzzy(f"50 {unit}", "kg")
-
-
-@pytest.mark.parametrize(
-    ("text", "si", "value"),
-    [("2 N·s/m", "N*s/m", 2.0), ("3 m²", "m", None), ("2 N m^1.0", "N*m", 2.0), ("1 cm4", "m^4", 1e-8)],
-)  # fmt: skip
-def test_units_of_words_signs_and_powers_are_read(text, si, value):
-    if value is None:
-        with pytest.raises(ValueError, match="no unit of length"):
-            parse_fuzzy(text, si)
-    else:
-        assert parse_fuzzy(text, si).nominal == pytest.approx(value, rel=1e-15)
 
 
 @pytest.mark.parametrize("blocks", [1, 12, 40])

@@ -105,37 +105,33 @@ def test_numbers_of_a_narrow_axis_stand_apart_and_whole(width):
     assert ends == pytest.approx([x.get_position()[0] for x in (labels[0], labels[-1])], rel=1e-9)
 
 
-@pytest.mark.parametrize(("nature", "lines"), [("estimated", 2), ("guaranteed", 0)])
-def test_the_error_is_drawn_outside_bounds_that_it_may_pass(nature, lines):
-    time, one = np.linspace(0, 1, 11), np.ones(11)
+@pytest.mark.parametrize(
+    ("nature", "peak", "lines", "words"),
+    [
+        ("estimated", None, 2, "± 250 mm (dashed)"),
+        # as the table of peaks has it, with what lies between nodes
+        ("estimated", 0.5, 2, "peak ± 500 mm (at nodes dashed)"),
+        ("guaranteed", None, 0, ""),
+    ],
+)
+def test_the_error_is_drawn_outside_bounds_that_it_may_pass(nature, peak, lines, words):
+    one = np.ones((1, 2, 11))
     ends = {"lower": -one, "upper": one, "error": 0.25 * one}
     dataset = xarray.Dataset(
-        {name: (("alpha", "time"), np.array([values, values])) for name, values in ends.items()},
-        coords={"alpha": [0.0, 1.0], "time": time},
+        {name: (("output", "alpha", "time"), values) for name, values in ends.items()},
+        coords={"output": ["q1"], "alpha": [0.0, 1.0], "time": np.linspace(0, 1, 11)},
         attrs={"nature": nature},
-    ).expand_dims(output=["q1"])
-    task, unit = SimpleNamespace(fuzzy=("k",)), ShownUnit("m", 1.0)
-    with figure_style():
-        (axes,) = envelope.envelope(dataset, Output("q1", "m"), task, unit).axes
-    dashed = [line for line in axes.lines if line.get_linestyle() == "--"]
-    assert sorted(float(line.get_ydata()[0]) for line in dashed) == [-1.25, 1.25][:lines]
-    assert ("± 0.25 m" in " ".join(axes.get_title("left").split())) == bool(lines)
-
-
-def test_the_title_states_the_error_of_the_peak_with_what_lies_between_nodes():
-    """As the table of peaks does; the error at nodes is smaller."""
-    band = ("alpha", "time")
-    ends = {"lower": -np.ones((2, 11)), "upper": np.ones((2, 11)), "error": 0.1 * np.ones((2, 11))}
-    dataset = xarray.Dataset(
-        {name: (band, values) for name, values in ends.items()},
-        coords={"alpha": [0.0, 1.0], "time": np.linspace(0, 1, 11)},
-        attrs={"nature": "estimated"},
-    ).expand_dims(output=["q1"])
-    task, peak = SimpleNamespace(fuzzy=("k",)), SimpleNamespace(error=np.array([0.5, 0.4]))
+    )
+    task = SimpleNamespace(fuzzy=("k",))
+    found = peak and SimpleNamespace(error=np.array([peak, 0.4]))
     unit = ShownUnit("mm", 1e3)
     with figure_style():
-        figure = envelope.envelope(dataset, Output("q1", "m"), task, unit, peak=peak)
-    assert "peak ± 500 mm (at nodes dashed)" in " ".join(figure.axes[0].get_title("left").split())
+        (axes,) = envelope.envelope(dataset, Output("q1", "m"), task, unit, peak=found).axes
+    dashed = [line for line in axes.lines if line.get_linestyle() == "--"]
+    assert sorted(float(line.get_ydata()[0]) for line in dashed) == [-1.25, 1.25][:lines]
+    title = " ".join(axes.get_title("left").split())
+    assert words in title
+    assert ("±" in title) == bool(words)
 
 
 def test_numbers_and_bounds_are_drawn_with_their_own_ends():

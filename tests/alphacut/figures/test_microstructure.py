@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from alphacut import main
 from alphacut.stochastic import microstructure
+from tests.alphacut.small import told_by
 
 CASE = """
 title = "Particles of a section"
@@ -36,7 +36,7 @@ def few_resamples(monkeypatch):
 def figures(folder, section):
     """Figures of a run of a case, with their sizes in bytes."""
     (folder / "case.toml").write_text(CASE + section, encoding="utf-8")
-    assert main(["run", f"{folder}/case.toml", f"--out={folder}/out", "--quiet"]) == 0
+    told_by("run", f"{folder}/case.toml", f"--out={folder}/out", "--quiet")
     return {file.name: file.stat().st_size for file in (folder / "out/figures").iterdir()}
 
 

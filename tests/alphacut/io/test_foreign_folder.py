@@ -9,7 +9,7 @@ import xarray
 from alphacut import main
 from alphacut.base.kept_files import digest_of
 from alphacut.io.results import MANIFEST, ResultsFolder, write_arrays
-from tests.alphacut.small import written
+from tests.alphacut.small import told_by, written
 
 
 @pytest.fixture
@@ -17,7 +17,7 @@ def finished(tmp_path):
     """The folder of a run with an envelope."""
     out = tmp_path / "out"
     case = written(tmp_path)
-    assert main(["run", str(case), "--quiet", "--no-figures", "--out", str(out)]) == 0
+    told_by("run", case, "--quiet", "--no-figures", "--out", out)
     return out
 
 
@@ -81,25 +81,23 @@ def test_values_of_other_files_are_refused(finished, tmp_path, capsys, command, 
 
 @pytest.mark.parametrize("place", [3, 5, 9, 40, 200, 1000])
 def test_damaged_arrays_in_a_list_that_vouches_for_them_are_one_line(
-    finished, tmp_path, capsys, place, rng
+    finished, tmp_path, place, rng
 ):
     content = bytearray((finished / "envelope_all.nc").read_bytes())
     content[place : place + 8] = rng.bytes(8)
     damaged = tmp_path / "damaged.nc"
     damaged.write_bytes(content[: rng.integers(place + 8, len(content))])
     replace_arrays(finished, damaged)
-    capsys.readouterr()
-    assert main(["report", str(finished)]) == 2
-    assert len(capsys.readouterr().err.splitlines()) == 1
+    assert len(told_by("report", finished, status=2).splitlines()) == 1
 
 
-def test_results_of_the_former_format_are_named(finished, capsys):
+def test_results_of_the_former_format_are_named(finished):
     document = json.loads((finished / MANIFEST).read_text())
     document["format_version"] = 4
     (finished / MANIFEST).write_text(json.dumps(document))
-    capsys.readouterr()
-    assert main(["report", str(finished)]) == 2
-    assert "manifest.json is of format 4; allowed: files of format 5" in capsys.readouterr().err
+    assert "manifest.json is of format 4; allowed: files of format 5" in told_by(
+        "report", finished, status=2
+    )
 
 
 def test_arrays_are_what_any_reader_of_netcdf_reads(finished):

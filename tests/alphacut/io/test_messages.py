@@ -6,13 +6,12 @@ import sys
 import numpy as np
 import pytest
 
-from alphacut import main
 from alphacut.frame import Accelerogram, MatrixStructure, Proof, StoreyFrame, envelope
 from alphacut.fuzzy import Crisp, FailedError, General, Interval, RefusedError, propagate
 from alphacut.io.files import missing
 from alphacut.rve import read_image
 from alphacut.stochastic import read_particles
-from tests.alphacut.small import FRAME, written
+from tests.alphacut.small import FRAME, told_by, written
 
 CURE = "take it from the head of the file"
 
@@ -58,29 +57,28 @@ def test_a_missing_package_names_the_file_that_needs_it(monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize("digits", ["9" * 6000, "0x" + "f" * 6000])
-def test_an_integer_of_thousands_of_digits_is_one_line(tmp_path, capfd, digits):
+def test_an_integer_of_thousands_of_digits_is_one_line(tmp_path, digits):
     case = written(tmp_path, FRAME.replace('"10 mm"', digits))
-    assert main(["check", str(case)]) == 2
-    err = capfd.readouterr().err
+    err = told_by("check", case, status=2)
     assert len(err.splitlines()) == 1
     assert len(err) < 320
     assert "case.toml: " in err
-    assert main(["check", str(written(tmp_path)), "--set", f"envelope.gain={digits}"]) == 2
-    assert "envelope.gain" in capfd.readouterr().err
+    assert "envelope.gain" in told_by(
+        "check", written(tmp_path), "--set", f"envelope.gain={digits}", status=2
+    )
     with pytest.raises(RefusedError, match="thousands of digits"):
         Crisp(int(digits, 16))
 
 
 @pytest.mark.parametrize("head", ["time [s],acceleration [m/s^2]", "x [mm],y [mm],r [mm]"])
-def test_a_field_of_200_kb_is_one_line(tmp_path, capfd, head):
+def test_a_field_of_200_kb_is_one_line(tmp_path, head):
     (tmp_path / "a.csv").write_text(f"{head}\n0,0,1\n0.1,{'1' * 200_000},1\n")
     text = FRAME.replace('displacements = "10 mm"', 'accelerogram = "a.csv"')
     if "r [mm]" in head:
         with pytest.raises(RefusedError, match=r"a.csv, row 3.* 200,006 letters"):
             read_particles(tmp_path / "a.csv", size=(0.1, 0.1))
         return
-    assert main(["check", str(written(tmp_path, text))]) == 2
-    assert "letters" in capfd.readouterr().err
+    assert "letters" in told_by("check", written(tmp_path, text), status=2)
 
 
 FLOOR = StoreyFrame((1e4,), (3.0,), 2e10, (1e-5,), dampers=(50.0,), q0=(0.01,))

@@ -13,7 +13,7 @@ import pytest
 
 from alphacut import main
 from alphacut.io.results import Listed, ResultsFolder
-from tests.alphacut.small import CELL, summary_of, written
+from tests.alphacut.small import CELL, summary_of, told_by, written
 from tests.refused import refuses
 
 
@@ -41,9 +41,9 @@ def finished(tmp_path_factory):
     case = written(folder, CELL)
     older, out = folder / "older", folder / "out"
     assert run(case, older, "--set", "cell.matrix_poisson=0.2", "--no-figures") == 0
-    assert main(["report", str(older)]) == 0
+    told_by("report", older)
     assert run(case, out) == 0
-    assert main(["report", str(out)]) == 0
+    told_by("report", out)
     return case, out, older
 
 
@@ -223,7 +223,7 @@ def test_a_file_that_no_manifest_lists_is_not_replaced(tmp_path, capfd):
         ResultsFolder(tmp_path / "out").put_text("notes.json", "text")
 
 
-def test_a_manifest_of_another_program_is_left_alone(tmp_path, capfd):
+def test_a_manifest_of_another_program_is_left_alone(tmp_path):
     folder = tmp_path / "out"
     folder.mkdir()
     (folder / "manifest.json").write_text('{"name": "a web page"}')
@@ -232,7 +232,7 @@ def test_a_manifest_of_another_program_is_left_alone(tmp_path, capfd):
     assert [x.name for x in folder.iterdir()] == ["manifest.json"]
 
 
-def test_a_folder_of_figures_that_is_a_link_is_refused(finished, tmp_path, capfd):
+def test_a_folder_of_figures_that_is_a_link_is_refused(finished, tmp_path):
     case, out, _ = finished
     copy, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
     shutil.copytree(out, copy)
@@ -240,7 +240,7 @@ def test_a_folder_of_figures_that_is_a_link_is_refused(finished, tmp_path, capfd
     (copy / "figures").symlink_to(elsewhere)
     before = {x.name: x.read_bytes() for x in elsewhere.iterdir()}
     assert run(case, copy, "--set", "title=other") == 2
-    assert main(["report", str(copy)]) == 0
+    told_by("report", copy)
     assert "data:image/png" not in (copy / "report.html").read_text()
     assert run(case, copy, "--fresh", "--no-figures") == 0
     assert {x.name: x.read_bytes() for x in elsewhere.iterdir()} == before
@@ -257,7 +257,7 @@ def test_the_page_does_not_embed_or_write_through_links(finished, tmp_path):
     (copy / "report.html").unlink()
     (copy / "report.html").symlink_to(tmp_path / "outside.html")
     (tmp_path / "outside.html").write_text("precious")
-    assert main(["report", str(copy)]) == 0
+    told_by("report", copy)
     assert (copy / "report.html").read_text().count("data:image/png") == whole - 1
     assert (tmp_path / "outside.html").read_text() == "precious"
 

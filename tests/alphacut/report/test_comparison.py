@@ -5,8 +5,7 @@ import re
 
 import pytest
 
-from alphacut import main
-from tests.alphacut.small import summary_of, two_floors_run
+from tests.alphacut.small import summary_of, told_by, two_floors_run
 
 
 @pytest.fixture(scope="module")
@@ -17,10 +16,9 @@ def runs(two_floors, tmp_path_factory):
     )
 
 
-def test_two_runs_stand_side_by_side(runs, capsys):
+def test_two_runs_stand_side_by_side(runs):
     a, b = runs
-    assert main(["report", str(a), str(b)]) == 0
-    head, *lines = (re.split(" {2,}", x) for x in capsys.readouterr().out.splitlines())
+    head, *lines = (re.split(" {2,}", x) for x in told_by("report", a, b).splitlines())
     rows = {line[0]: dict(zip(head, line, strict=False)) for line in lines}
     peaks = [summary_of(x)["envelopes"]["all"]["peak"]["q2"]["upper"][0] for x in runs]
     ratio = float(rows["greatest peak of q2"]["second over first"])
@@ -29,10 +27,9 @@ def test_two_runs_stand_side_by_side(runs, capsys):
     assert "width of the peak of drift1" in rows
 
 
-def test_more_runs_have_a_column_and_a_ratio_each(runs, capsys):
+def test_more_runs_have_a_column_and_a_ratio_each(runs):
     a, b = map(str, runs)
-    assert main(["report", a, b, a, b]) == 0
-    head, *lines = (re.split(" {2,}", x) for x in capsys.readouterr().out.splitlines())
+    head, *lines = (re.split(" {2,}", x) for x in told_by("report", a, b, a, b).splitlines())
     assert head[1:5] == ["first", "second", "third", "4th"]
     row = next(x for x in lines if x[0] == "greatest peak of q2")
     values = dict(zip(head, row, strict=True))
@@ -45,7 +42,7 @@ def test_the_comparison_and_all_tables_are_written(runs, tmp_path):
     a, b = runs
     page = tmp_path / "both.html"
     words = ["--quiet", "--csv", str(tmp_path), "--tables", str(tmp_path), "--out", str(page)]
-    assert main(["report", str(a), str(b), *words]) == 0
+    told_by("report", a, b, *words)
     assert "greatest peak of q2" in page.read_text(encoding="utf-8")
     assert "greatest peak of q2" in (tmp_path / "comparison.tex").read_text(encoding="utf-8")
     with (tmp_path / "comparison.csv").open(encoding="utf-8") as file:
@@ -59,7 +56,7 @@ def test_the_comparison_and_all_tables_are_written(runs, tmp_path):
     assert row["unit"] == "mm"
     assert float(row["second over first"]) == pytest.approx(peaks[1] / peaks[0], rel=1e-9)
     assert rows["|q2| ≤ 300 mm"]["first"] == "not exceeded"
-    assert main(["report", str(a), "--quiet", "--tables", str(tmp_path)]) == 0
+    told_by("report", a, "--quiet", "--tables", tmp_path)
     names = {path.stem for path in tmp_path.glob("*.tex")}
     assert names >= {"decision", "peaks"}
     text = (tmp_path / "decision.tex").read_text(encoding="utf-8")

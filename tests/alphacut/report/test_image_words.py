@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut import main
+from tests.alphacut.small import told_by
 
 CASE = """
 title = "pores"
@@ -55,15 +55,11 @@ def unwrapped(text):
     ],
     ids=["closed", "percolating", "volume", "rigid"],
 )
-def test_texts_say_what_is_guaranteed_of_what(
-    tmp_path, capfd, shape, first, percolates, words, other
-):
+def test_texts_say_what_is_guaranteed_of_what(tmp_path, shape, first, percolates, words, other):
     case, out = place(tmp_path, shape, first, percolates=percolates), tmp_path / "out"
-    assert main(["run", case, f"--out={out}", "--no-figures"]) == 0
-    assert words[0] in unwrapped(capfd.readouterr().out)
-    assert main(["modulus", case, f"--out={out}"]) == 0
-    printed = unwrapped(capfd.readouterr().out)
-    assert main(["report", str(out), "--quiet"]) == 0
+    assert words[0] in unwrapped(told_by("run", case, f"--out={out}", "--no-figures"))
+    printed = unwrapped(told_by("modulus", case, f"--out={out}"))
+    told_by("report", out, "--quiet")
     page = unwrapped((out / "report.html").read_text(encoding="utf-8"))
     for text in (printed, page):
         assert all(x in text for x in words)

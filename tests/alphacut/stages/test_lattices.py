@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from alphacut import main
 from alphacut.case.content import load
 from alphacut.rve.cell.lattice import HEXAGONAL, SQUARE
 from alphacut.stages.cell import CellProblem
 from alphacut.stages.modulus import identity, solved
 from tests.alphacut.case.test_load import fraction_case, problems, read
-from tests.alphacut.small import CELL, refusals, written
+from tests.alphacut.small import CELL, refusals, told_by, written
 
 
 def problem(folder, *changes):
@@ -64,10 +63,9 @@ def test_other_lattices_are_refused_in_one_line(tmp_path, lattice):
     assert f'cell.lattice is {lattice}; allowed: "square", "hexagonal"' in line
 
 
-def test_spheres_and_fitted_radii_have_the_square_alone(tmp_path, capsys):
+def test_spheres_and_fitted_radii_have_the_square_alone(tmp_path):
     changes = "cell.particles=spheres", "cell.lattice=hexagonal"
     [line] = refusals(written(tmp_path, CELL), *changes)
     assert 'cell.lattice is hexagonal; allowed: "square", the cubic array of spheres' in line
-    assert main(["check", "cases/concrete.toml", "--set=cell.lattice=hexagonal"]) == 2
-    error = capsys.readouterr().err
+    error = told_by("check", "cases/concrete.toml", "--set=cell.lattice=hexagonal", status=2)
     assert "allowed: square beside stage microstructure; give [radius] or cell.fraction" in error

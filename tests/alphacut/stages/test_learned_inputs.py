@@ -2,8 +2,7 @@
 
 import pandas as pd
 
-from alphacut import main
-from tests.alphacut.small import summary_of
+from tests.alphacut.small import summary_of, told_by
 
 CASE = """
 title = "Two stiffnesses from one frequency"
@@ -38,21 +37,20 @@ samples = 3
 BOX = "of the box around the learned set"
 
 
-def run_with(folder, text, capfd):
+def run_with(folder, text):
     """The summary, the console, the page and the CSV files of a run by name."""
     (folder / "modes.csv").write_text("mode,frequency [Hz]\n1,2.199\n")
     case = folder / "case.toml"
     case.write_text(text, encoding="utf-8")
-    assert main(["run", str(case), "--no-figures", "--out", str(folder / "out")]) == 0
-    told = " ".join(capfd.readouterr().out.split())
-    assert main(["report", str(folder / "out"), "--csv", str(folder / "csv")]) == 0
+    told = " ".join(told_by("run", case, "--no-figures", "--out", folder / "out").split())
+    told_by("report", folder / "out", "--csv", folder / "csv")
     (page,) = (folder / "out").glob("*.html")
     tables = {path.stem: pd.read_csv(path) for path in (folder / "csv").glob("*.csv")}
     return summary_of(folder / "out"), told, page.read_text(encoding="utf-8"), tables
 
 
-def test_questions_say_of_which_box_they_are_and_claim_nothing_reached_in_it(tmp_path, capfd):
-    summary, told, page, tables = run_with(tmp_path, CASE + QUESTIONS, capfd)
+def test_questions_say_of_which_box_they_are_and_claim_nothing_reached_in_it(tmp_path):
+    summary, told, page, tables = run_with(tmp_path, CASE + QUESTIONS)
     low, high, _ = (summary["decision"]["limits"][x] for x in summary["decision"]["limits"])
     assert low["verdict"] == "undecided"
     assert low["possibility"] == [0.0, 1.0]
@@ -77,20 +75,19 @@ def test_questions_say_of_which_box_they_are_and_claim_nothing_reached_in_it(tmp
     assert page.count(BOX) >= 6
 
 
-def test_an_envelope_of_the_learned_inputs_alone_is_that_of_the_learned_set(tmp_path, capfd):
+def test_an_envelope_of_the_learned_inputs_alone_is_that_of_the_learned_set(tmp_path):
     text = CASE.replace('fuzzy = ["k", "zeta"]', 'fuzzy = ["k"]').replace("[0.05, 1]", "[0.05]")
     text = text.replace("[4, 5, 6] %", "5 %")
-    summary, told, _, tables = run_with(tmp_path, text, capfd)
+    summary, told, _, tables = run_with(tmp_path, text)
     peak = summary["envelopes"]["all"]["peak"]["drift1"]
     assert peak["nature"] == "guaranteed"
     assert BOX not in told
     assert peak["reached"][0] <= peak["upper"][0]
     assert not any(BOX in title for title in tables["envelope_all-drift1"])
-    assert main(["verify", str(tmp_path / "out")]) == 0
-    assert "exact motions agree with what is guaranteed" in capfd.readouterr().out
+    assert "exact motions agree with what is guaranteed" in told_by("verify", tmp_path / "out")
 
 
-def test_limited_outputs_that_are_not_listed_have_the_bounds_of_the_learned_set(tmp_path, capfd):
+def test_limited_outputs_that_are_not_listed_have_the_bounds_of_the_learned_set(tmp_path):
     text = CASE.replace('fuzzy = ["k", "zeta"]', 'fuzzy = ["k"]').replace("[0.05, 1]", "[0.05]")
     text = text.replace("[4, 5, 6] %", "5 %")
     upper, members = [], []
@@ -99,7 +96,7 @@ def test_limited_outputs_that_are_not_listed_have_the_bounds_of_the_learned_set(
         folder.mkdir()
         case = text.replace('["drift1"]', str(outputs).replace("'", '"'))
         case += '[decision]\nlimits = ["drift2 <= 12 mm"]\n'
-        summary, told, _, tables = run_with(folder, case, capfd)
+        summary, told, _, tables = run_with(folder, case)
         peak = summary["envelopes"]["all"]["peak"]["drift2"]
         assert BOX not in told
         upper.append(peak["upper"][0])
@@ -110,10 +107,10 @@ def test_limited_outputs_that_are_not_listed_have_the_bounds_of_the_learned_set(
     assert members[0] == members[1] <= upper[0]
 
 
-def test_nothing_is_said_to_be_open_of_studies_whose_column_reached_is_filled(tmp_path, capfd):
+def test_nothing_is_said_to_be_open_of_studies_whose_column_reached_is_filled(tmp_path):
     studies = '[[study]]\nname = "set"\nfuzzy = ["k"]\nduration = "0.5 s"\n'
     studies += '[[study]]\nname = "box"\nfuzzy = ["k", "zeta"]\nduration = "0.5 s"\n'
-    _, told, page, tables = run_with(tmp_path, CASE.replace("[0.05, 1]", "[0.05]") + studies, capfd)
+    _, told, page, tables = run_with(tmp_path, CASE.replace("[0.05, 1]", "[0.05]") + studies)
     assert "box: all bounds are those of the box around the learned set." in told
     assert "box: all bounds are those" in page
     reached = tables["peaks"].set_index("study")["peak reached"]

@@ -11,7 +11,7 @@ from alphacut import main
 from alphacut.rve import MeshModel, Phase
 from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.stochastic import TruncatedNormal
-from tests.alphacut.small import CELL, summary_of, summary_of_run, written
+from tests.alphacut.small import CELL, summary_of, summary_of_run, told_by, written
 
 MESHES = Path(__file__).parents[3] / "meshes"
 TEXT = f"""
@@ -37,34 +37,32 @@ def modulus(young):
     return model.solve(TruncatedNormal(-3, 3), phases)[0].with_average("isotropic").modulus
 
 
-def test_fuzzy_phases_of_a_mesh_run_to_a_report(tmp_path, capsys):
+def test_fuzzy_phases_of_a_mesh_run_to_a_report(tmp_path):
     case = written(tmp_path, TEXT)
-    assert main(["check", str(case)]) == 0
-    assert "cell.phases" in capsys.readouterr().out
-    assert main(["run", str(case), "--out", str(tmp_path / "out"), "--no-figures"]) == 0
-    text = capsys.readouterr().out
+    assert "cell.phases" in told_by("check", case)
+    text = told_by("run", case, "--out", tmp_path / "out", "--no-figures")
     assert "not declared" in text
     assert "guaranteed" not in text
     assert "C is an upper bound of this mesh" in text
     cuts = summary_of(tmp_path / "out")["modulus"]["E_GPa"]
     ends = [cuts["lower"][0], cuts["lower"][1], cuts["upper"][0]]
     assert ends == pytest.approx([modulus(e) / 1e9 for e in (75e9, 80e9, 85e9)], rel=1e-9)
-    assert main(["report", str(tmp_path / "out")]) == 0
+    told_by("report", tmp_path / "out")
     page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
     assert "Two particles" in page
     assert "C is an upper bound of this mesh" in page
 
 
-def test_a_mesh_that_is_refined_declares_its_error(tmp_path, capsys):
+def test_a_mesh_that_is_refined_declares_its_error(tmp_path):
     words = ["--set", "mesh.refine=true", "--json", str(tmp_path / "a.json")]
-    assert main(["cell", str(written(tmp_path, TEXT)), *words]) == 0
-    shown = capsys.readouterr().out
+    shown = told_by("cell", written(tmp_path, TEXT), *words)
     assert "not declared" not in shown
     assert "Cell: one UFL form over prisms by DOLFINx, solved by PETSc's cg with theta" in shown
     found = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
     assert 0 < modulus(80e9) / 1e9 / found["E_GPa"] - 1 < found["error"]["space"] < 1e-3
-    assert main(["check", str(written(tmp_path, CELL)), "--set", "mesh.refine=true"]) == 2
-    assert "mesh.refine is True; allowed: true beside mesh.file" in capsys.readouterr().err
+    assert "mesh.refine is True; allowed: true beside mesh.file" in told_by(
+        "check", written(tmp_path, CELL), "--set", "mesh.refine=true", status=2
+    )
 
 
 @pytest.fixture(scope="module")
@@ -78,10 +76,9 @@ def bounds():
     return {young: of(young) for young in (75e9, 80e9, 85e9)}
 
 
-def test_a_mesh_has_bounds_from_both_sides(tmp_path, capsys, bounds):
+def test_a_mesh_has_bounds_from_both_sides(tmp_path, bounds):
     words = ["--set", "mesh.bounds=true", "--json", str(tmp_path / "a.json")]
-    assert main(["cell", str(written(tmp_path, TEXT)), *words]) == 0
-    shown = capsys.readouterr().out
+    shown = told_by("cell", written(tmp_path, TEXT), *words)
     assert "The bounds are guaranteed for this mesh's geometry" in shown
     assert "C is an upper bound" not in shown
     assert "E_x, GPa, bounds" in shown
@@ -91,15 +88,15 @@ def test_a_mesh_has_bounds_from_both_sides(tmp_path, capsys, bounds):
     assert low < found["E_GPa"] <= high * (1 + 1e-7)
     assert high < low * 1.001
     assert found["bounds"]["stiffness_GPa"][1] == pytest.approx(bounds[80e9].upper / 1e9)
-    assert main(["check", str(written(tmp_path, CELL)), "--set", "mesh.bounds=true"]) == 2
-    assert "mesh.bounds is True; allowed: true beside mesh.file" in capsys.readouterr().err
+    assert "mesh.bounds is True; allowed: true beside mesh.file" in told_by(
+        "check", written(tmp_path, CELL), "--set", "mesh.bounds=true", status=2
+    )
 
 
-def test_alpha_cuts_of_a_mesh_with_bounds_are_guaranteed(tmp_path, capsys, bounds):
+def test_alpha_cuts_of_a_mesh_with_bounds_are_guaranteed(tmp_path, bounds):
     case, out = written(tmp_path, TEXT), tmp_path / "out"
     words = ["--set", "mesh.bounds=true", "--out", str(out), "--no-figures"]
-    assert main(["run", str(case), *words]) == 0
-    text = capsys.readouterr().out
+    text = told_by("run", case, *words)
     assert "guaranteed for this mesh's geometry" in text
     assert "attained" not in text
     result = summary_of(out)["modulus"]
@@ -109,7 +106,7 @@ def test_alpha_cuts_of_a_mesh_with_bounds_are_guaranteed(tmp_path, capsys, bound
     assert [cuts["lower"][0], cuts["upper"][0]] == pytest.approx([low / 1e9, high / 1e9])
     assert cuts["lower"][0] < modulus(75e9) / 1e9 < modulus(85e9) / 1e9 < cuts["upper"][0]
     assert cuts["upper"][1] < 1.001 * cuts["lower"][1]
-    assert main(["report", str(out)]) == 0
+    told_by("report", out)
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "bounds are guaranteed for this mesh" in page
 
@@ -119,22 +116,19 @@ AUXETIC = [
 ]  # 2 G_T = 20 GPa > 3 (C11 + C12) = 6 GPa
 
 
-def test_e_and_nu_of_no_isotropic_solid_are_refused_and_c_is_kept(tmp_path, capsys):
+def test_e_and_nu_of_no_isotropic_solid_are_refused_and_c_is_kept(tmp_path):
     phase = f"{{ modulus = {AUXETIC} }}".replace("'", '"')
     text = TEXT.partition("[cell.phases]")[0] + f"[cell.phases]\nmatrix = {phase}\n"
     case = written(tmp_path, f"{text}particles = {phase}\n")
-    assert main(["cell", str(case), "--json", str(tmp_path / "c.json")]) == 0
-    text = capsys.readouterr().out
+    text = told_by("cell", case, "--json", tmp_path / "c.json")
     assert "none: 2 G_T > 3 (C11 + C12)" in text
     assert "C is an upper bound of this mesh" in text  # whose error is not declared
     found = json.loads((tmp_path / "c.json").read_text())
     assert found["E_GPa"] is found["nu"] is None
     assert found["stiffness_GPa"][0] == pytest.approx([10, -8, 0], abs=1e-9)
-    assert main(["check", str(case)]) == 0
-    words = " ".join(capsys.readouterr().out.split())
+    words = " ".join(told_by("check", case).split())
     assert "cell.phases.matrix.modulus 10 −8 0 | −8 10 0 | 0 0 10 GPa" in words
-    assert main(["run", str(case), "--no-figures", f"--out={tmp_path}/out"]) == 3
-    err = capsys.readouterr().err
+    err = told_by("run", case, "--no-figures", f"--out={tmp_path}/out", status=3)
     assert "E would be -61.54 GPa" in err
     assert "mend the function" not in err  # advice for Python
 
@@ -142,7 +136,7 @@ def test_e_and_nu_of_no_isotropic_solid_are_refused_and_c_is_kept(tmp_path, caps
 def solved(case, path, *options):
     """The document of the command `cell`, with the mesh in a file."""
     words = ["--export", str(path), "--json", str(path.with_suffix(".json")), "--quiet"]
-    assert main(["cell", str(case), *words, *options]) == 0
+    told_by("cell", case, *words, *options)
     return json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
 
 

@@ -7,14 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from alphacut import main
 from alphacut.case.content import load
 from alphacut.fuzzy import FailedError, Nature
 from alphacut.rve.fuzzy_cell import CellSamples, FuzzyCell, require_consistent
 from alphacut.stages.cell import CellProblem, require_bounds
 from alphacut.stages.modulus import solved
 from tests.alphacut.case.test_load import fraction_case
-from tests.alphacut.small import CELL, refusals, written
+from tests.alphacut.small import CELL, refusals, told_by, written
 from tests.refused import refuses
 
 MODELS = {
@@ -44,10 +43,11 @@ def test_cuts_agree_with_a_coarser_model_and_narrower_ones_do_not(tmp_path, mode
             require_consistent(wrong, coarse, error=0.0)
 
 
-def test_only_e_whose_signs_are_proved_is_called_guaranteed(tmp_path, capsys):
+def test_only_e_whose_signs_are_proved_is_called_guaranteed(tmp_path):
     words = ["--set=modulus.plan=signed", "--set=cell.inclusion_poisson=0.3"]
-    assert main(["modulus", str(written(tmp_path, CELL)), f"--out={tmp_path}/out", *words]) == 0
-    table = capsys.readouterr().out.partition("\nmaterial ")[2]
+    table = told_by("modulus", written(tmp_path, CELL), f"--out={tmp_path}/out", *words).partition(
+        "\nmaterial "
+    )[2]
     rows = (re.split(" {2,}", line) for line in table.splitlines())
     natures = {row[0]: row[-1] for row in rows if row[-1] in [*Nature]}
     assert natures.pop("E, GPa (isotropic)") == "guaranteed"

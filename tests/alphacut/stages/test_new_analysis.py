@@ -14,7 +14,7 @@ from alphacut.case.analyses import ANALYSES, Analysis, Picture
 from alphacut.frame import Limit
 from alphacut.frame.analyses.answer import Answer
 from alphacut.frame.analyses.question import Question
-from tests.alphacut.small import FRAME, summary_of_run, written
+from tests.alphacut.small import FRAME, summary_of_run, told_by, written
 
 CASE = (
     FRAME.replace('method = "graph-follower"\ntolerance = "0.1 mm"\n', "")
@@ -101,7 +101,7 @@ def entry(monkeypatch):
     return found
 
 
-def test_a_new_analysis_takes_its_class_and_one_entry(tmp_path, capfd, entry):
+def test_a_new_analysis_takes_its_class_and_one_entry(tmp_path, entry):
     case, out = written(tmp_path, CASE), tmp_path / "out"
     assert main(["run", str(case), "--quiet", "--out", str(out), "--json", "-"]) == 0
     assert '"modulus": 26000000000.0' in (out / "summary.json").read_text()
@@ -127,20 +127,20 @@ def test_a_new_analysis_takes_its_class_and_one_entry(tmp_path, capfd, entry):
         ("stiffest.moment=1", "stiffest.count"),
     ],
 )
-def test_its_options_have_units_ranges_and_words_of_their_own(tmp_path, capfd, entry, change, key):
+def test_its_options_have_units_ranges_and_words_of_their_own(tmp_path, entry, change, key):
     case = written(tmp_path, CASE)
-    assert main(["check", str(case), "--set", change]) == 2
-    (line,) = capfd.readouterr().err.splitlines()
+    (line,) = told_by("check", case, "--set", change, status=2).splitlines()
     assert key in line
 
 
-def test_a_missing_option_is_said_in_the_words_of_its_class(tmp_path, capfd, entry):
-    assert main(["check", str(written(tmp_path, CASE, **{'least = "2 kN/m"\n': ""}))]) == 2
-    assert "Smallest stiffness of interest, of all storeys" in capfd.readouterr().err
+def test_a_missing_option_is_said_in_the_words_of_its_class(tmp_path, entry):
+    assert "Smallest stiffness of interest, of all storeys" in told_by(
+        "check", written(tmp_path, CASE, **{'least = "2 kN/m"\n': ""}), status=2
+    )
 
 
 def test_without_its_entry_the_section_is_unknown(tmp_path):
-    assert main(["check", str(written(tmp_path, CASE))]) == 2
+    told_by("check", written(tmp_path, CASE), status=2)
 
 
 def test_an_analysis_of_a_structure_at_rest_is_a_stage(tmp_path, monkeypatch, entry):
@@ -148,4 +148,4 @@ def test_an_analysis_of_a_structure_at_rest_is_a_stage(tmp_path, monkeypatch, en
     monkeypatch.setitem(ANALYSES, "stiffest", alone)
     found = summary_of_run(written(tmp_path, ALONE))
     assert found["stiffest"]["modulus"] == pytest.approx(26e9)
-    assert main(["check", str(written(tmp_path, ALONE, **{'["E", "m"]': '["E", "x"]'}))]) == 2
+    told_by("check", written(tmp_path, ALONE, **{'["E", "m"]': '["E", "x"]'}), status=2)

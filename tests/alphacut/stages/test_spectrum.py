@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from alphacut import main
 from alphacut.case.content import load
 from alphacut.frame import (
     Limit,
@@ -14,28 +13,12 @@ from alphacut.frame import (
     spectrum_checks,
     spectrum_response,
 )
-from tests.alphacut.small import refusals, summary_of, summary_of_run, written
+from tests.alphacut.small import summary_of, summary_of_run, table_of, told_by, written
 
 ROOT = Path(__file__).parents[3]
-CASE = """
-title = "Three storeys under a design spectrum"
-stages = ["response_spectrum"]
-[frame]
-masses = ["50 t", "50 t", "[45, 50, 60] t"]
-lengths = ["3.5 m", "3 m", "3 m"]
-stiffness = ["90 MN/m ± 10 %", "80 MN/m", "70 MN/m"]
-damping_ratio = "5 %"
-outputs = ["drift1", "shear1", "a3"]
-[response_spectrum]
-ground_acceleration = "0.25 g"
-ground_type = "C"
-q = 3.9
-fuzzy = ["k1", "m3"]
-alpha = [0, 1]
-limits = ["drift <= 0.5 %", "base_shear <= 300 kN"]
-base_shear_floor = "250 kN"
-theta = 0.1
-"""
+
+
+CASE = table_of("spectrum")["case"]
 RECORDS = """
 [records]
 files = ["*.AT2"]
@@ -51,7 +34,7 @@ step = "0.02 s"
 def test_a_case_has_the_peaks_and_verdicts_of_the_python_interface(tmp_path):
     case = written(tmp_path, CASE)
     folder = tmp_path / "out"
-    assert main(["run", str(case), "--quiet", "--out", str(folder)]) == 0
+    told_by("run", case, "--quiet", "--out", folder)
     summary = summary_of(folder)
     structure = load(case).content.structure
     frame = structure.model.with_outputs(("drift1", "shear1", "drift2", "drift3", "base_shear"))
@@ -70,7 +53,7 @@ def test_a_case_has_the_peaks_and_verdicts_of_the_python_interface(tmp_path):
     assert limits["min base_shear"]["verdict"] == "can be exceeded"
     for name in ("response_spectrum", "spectrum_checks"):
         assert (folder / f"figures/{name}.svg").is_file()
-    assert main(["report", str(folder), "--quiet"]) == 0
+    told_by("report", folder, "--quiet")
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "as at k1 = " in page
     assert "kN" in page
@@ -85,32 +68,3 @@ def test_beside_records_the_method_tells_its_errors(tmp_path):
     assert errors["names"] == ["record-2001", "record-2005"]
     assert errors["nature"] == "guaranteed"
     assert np.abs(np.array(errors["combined"]) / np.array(errors["peaks"])[..., 0] - 1).max() < 0.5
-
-
-VALUES = f"values = {['0.3 g'] * 22}"
-
-
-@pytest.mark.parametrize(
-    ("changes", "word"),
-    [
-        ({'ground_type = "C"': 'ground_type = "F"'}, "response_spectrum.ground_type is F"),
-        ({'ground_type = "C"': ""}, "response_spectrum.ground_type is empty"),
-        ({'ground_acceleration = "0.25 g"\nground_type = "C"\n': ""}, "ground_acceleration is missing"),
-        ({'fuzzy = ["k1", "m3"]': 'fuzzy = ["k2"]'}, "response_spectrum.fuzzy"),
-        ({'"base_shear <= 300 kN"': '"max base_shear <= 300 kN"'}, "response_spectrum.limits"),
-        ({'"base_shear <= 300 kN"': '"a1 <= 1 g"'}, "response_spectrum: output is a1"),
-        ({'ground_acceleration = "0.25 g"': VALUES, "q = 3.9": ""}, "ground_type is C; allowed: be"),
-        ({'lengths = ["3.5 m", "3 m", "3 m"]\n': "", '"drift <= 0.5 %", ': ""}, "theta"),
-        ({'stages = ["response_spectrum"]': 'stages = ["envelope"]'}, "envelope"),
-        ({'q = 3.9': 'q = 0.5'}, "response_spectrum.q"),
-    ],
-)  # fmt: skip
-def test_what_does_not_fit_is_refused_by_its_key(changes, word, tmp_path):
-    case = written(tmp_path, CASE)
-    text = case.read_text(encoding="utf-8")
-    for old, new in changes.items():
-        assert old in text
-        text = text.replace(old, new)
-    case.write_text(text, encoding="utf-8")
-    (line, *_) = refusals(case)
-    assert word in line

@@ -10,14 +10,13 @@ import pytest
 import xarray
 
 import alphacut
-from alphacut import main
 from alphacut.base.progress_bar import progress_reporter
 from alphacut.case.content import load
 from alphacut.fuzzy import FailedError
 from alphacut.io.results import ResultsFolder
 from alphacut.stages import envelope
 from alphacut.stages.store import RunProgress, Stage, StageResult, StageStore
-from tests.alphacut.small import CELL, summary_of, written
+from tests.alphacut.small import CELL, summary_of, told_by, written
 
 ROOT = Path(alphacut.__file__).resolve().parents[1]
 
@@ -98,17 +97,14 @@ def test_fingerprints_see_every_input(tmp_path):
     assert key() == key("title=other")
 
 
-def test_a_borrowed_folder_is_not_believed(tmp_path, capfd):
+def test_a_borrowed_folder_is_not_believed(tmp_path):
     folder = tmp_path / "out"
-    assert main(["run", str(written(tmp_path, CELL)), "--out", str(folder), "--no-figures"]) == 0
+    told_by("run", written(tmp_path, CELL), "--out", folder, "--no-figures")
     results, summary = ResultsFolder.read(folder), summary_of(folder)
-    assert main(["report", str(folder), "--quiet"]) == 0
-    capfd.readouterr()
+    told_by("report", folder, "--quiet")
     changed = json.dumps(summary | {"fingerprints": {"modulus": "other"}})
     results.put_text("summary.json", changed)
-    assert main(["report", str(folder), "--quiet"]) == 2
-    assert "of another run" in capfd.readouterr().err
+    assert "of another run" in told_by("report", folder, "--quiet", status=2)
     for text in ("", "[" * 100_000, '{"case": 1}'):
         (folder / "summary.json").write_text(text)
-        assert main(["report", str(folder), "--quiet"]) == 2
-        assert "is changed" in capfd.readouterr().err
+        assert "is changed" in told_by("report", folder, "--quiet", status=2)

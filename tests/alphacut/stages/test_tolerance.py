@@ -2,7 +2,7 @@
 
 import pytest
 
-from alphacut import main
+from tests.alphacut.small import told_by
 
 CASE = """
 title = "Columns far from yielding"
@@ -34,14 +34,12 @@ def case(tmp_path):
     return str(path)
 
 
-def test_an_output_that_stays_zero_keeps_every_tolerance(case, tmp_path, capfd):
+def test_an_output_that_stays_zero_keeps_every_tolerance(case, tmp_path):
     """A residual drift without yielding has no peak that its error, zero, were a fraction of."""
-    assert main(["run", case, "--out", str(tmp_path / "out"), "--no-figures"]) == 0
-    assert "residual1" in capfd.readouterr().out
+    assert "residual1" in told_by("run", case, "--out", tmp_path / "out", "--no-figures")
 
 
-def test_a_larger_error_fails_by_its_output(case, tmp_path, capfd):
+def test_a_larger_error_fails_by_its_output(case, tmp_path):
     """The peak between nodes is known to a few thousandths."""
     options = ["--out", str(tmp_path / "out"), "--no-figures", "--set", "envelope.tolerance=1e-7"]
-    assert main(["run", case, *options]) == 1
-    assert "the error of q1 is" in capfd.readouterr().err
+    assert "the error of q1 is" in told_by("run", case, *options, status=1)
