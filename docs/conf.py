@@ -70,7 +70,7 @@ CONSTANTS = {
     "DISCS": "alphacut.stochastic.particles.shapes",
     "INTEGRATORS": "alphacut.frame.dynamics.integrators",
     "LOADS": "alphacut.rve.cell.cell",
-    "METHODS": "alphacut.frame.propagation",
+    "METHODS": "alphacut.frame.methods.method",
     "SPHERES": "alphacut.stochastic.particles.shapes",
     "STRAIN": "alphacut.rve.cell.cell",
 }

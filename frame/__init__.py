@@ -44,9 +44,10 @@ if TYPE_CHECKING:
     from alphacut.frame.methods.dual import DualProof
     from alphacut.frame.methods.graph_follower import GraphFollower
     from alphacut.frame.methods.improved_follower import ImprovedFollower
+    from alphacut.frame.methods.method import METHODS
     from alphacut.frame.methods.proof import Proof
     from alphacut.frame.methods.sampled import Sampled
-    from alphacut.frame.propagation import METHODS, envelope, require_envelope
+    from alphacut.frame.propagation import envelope, require_envelope
     from alphacut.frame.records.history import Accelerogram, History
     from alphacut.frame.records.suite import read_record, read_suite
     from alphacut.frame.result import Envelope
@@ -89,7 +90,7 @@ __all__ = [
 ]  # fmt: skip
 AT_FIRST_USE = {
     "INTEGRATORS": "dynamics.integrators",
-    "METHODS": "propagation",
+    "METHODS": "methods.method",
     "Accelerogram": "records.history",
     "AnglePeaks": "analyses.angles",
     "Auto": "methods.auto",

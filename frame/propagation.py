@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
-from pkgutil import resolve_name
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints, on_one_blas_thread
 from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.base.progress_bar import Progress, progress_reporter, searching, subprogress
-from alphacut.frame.bounds.box_proof import refusing
 from alphacut.frame.boxes import ALPHA, Boxes, UnitFlow, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
+from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact, Integrator
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.dynamics.yielding import YieldingFlow
+from alphacut.frame.methods.method import METHODS, Method, require_kinks
 from alphacut.frame.result import Ends, Envelope
 from alphacut.frame.structures.linear import (
     LinearSystem,
@@ -34,46 +32,7 @@ from alphacut.frame.verification.step_error import step_error, with_node_deviati
 from alphacut.fuzzy import FuzzyNumber
 
 if TYPE_CHECKING:
-    from alphacut.frame.methods.auto import Auto
-    from alphacut.frame.methods.dual import DualProof
-    from alphacut.frame.methods.graph_follower import GraphFollower
-    from alphacut.frame.methods.improved_follower import ImprovedFollower
     from alphacut.frame.methods.proof import Proof
-    from alphacut.frame.methods.sampled import Sampled
-
-Method: TypeAlias = "Auto | Proof | DualProof | GraphFollower | ImprovedFollower | Sampled"
-"""How an envelope is computed, with its options as fields."""
-
-
-class MethodClasses(Mapping[str, "type[Method]"]):
-    """Classes of methods by name, each imported when it is looked up: the proofs take .05 s."""
-
-    PLACES: ClassVar = {
-        "auto": "auto:Auto",
-        "proof": "proof:Proof",
-        "dual": "dual:DualProof",
-        "graph-follower": "graph_follower:GraphFollower",
-        "improved-graph-follower": "improved_follower:ImprovedFollower",
-        "quasi-monte-carlo": "sampled:Sampled",
-    }
-    """Module in `alphacut.frame.methods` and class of each method."""
-
-    def __getitem__(self, name: str) -> type[Method]:
-        """Return the class of a method."""
-        found: type[Method] = resolve_name(f"alphacut.frame.methods.{self.PLACES[name]}")
-        return found
-
-    def __iter__(self) -> Iterator[str]:
-        """Return an iterator over the names."""
-        return iter(self.PLACES)
-
-    def __len__(self) -> int:
-        """Return the number of methods."""
-        return len(self.PLACES)
-
-
-METHODS = MethodClasses()
-"""The methods by the words that a case file has for them."""
 
 
 @on_one_blas_thread
@@ -231,14 +190,10 @@ def _build_problem(
     if method is None:
         method = "auto" if has_matrices(model) else "improved-graph-follower"
     chosen = _chosen_method(method, options)
-    # The response of columns that yield has kinks as a function of the parameters.
-    takes_kinks = chosen.name in ("auto", "proof", "quasi-monte-carlo")
-    is_possible = takes_kinks or not yields(model)
-    allowed = "auto, proof or quasi-monte-carlo where columns yield"
-    require(is_possible, "method", value=chosen.name, allowed=allowed)
+    require_kinks(model, chosen)
     if integrator is None:
         # Proofs hold for the exact response.
-        is_exact = yields(model) or chosen.name in ("auto", "proof", "dual")
+        is_exact = yields(model) or chosen.is_exact
         integrator = "exact" if is_exact and has_matrices(model) else "midpoint"
     cuts = boxes(inputs, alpha)
     flow = make_flow(model, cuts.names, duration, step, integrator)
@@ -261,8 +216,7 @@ def _chosen_method(method: Method | str, options: Mapping[str, Any]) -> Method:
     """
     if not isinstance(method, str):
         allowed = f"{', '.join(METHODS)}, or an object as Proof()"
-        is_method = isinstance(method, tuple(METHODS.values()))
-        require(is_method, "method", value=repr(method), allowed=allowed)
+        require(isinstance(method, Method), "method", value=repr(method), allowed=allowed)
         allowed = "none beside a method that is no name"
         require(not options, "options", value=[*options], allowed=allowed)
         return method
@@ -308,15 +262,7 @@ def require_envelope(
     if isinstance(first_steps, LinearFlow):
         first_steps = replace(first_steps, by_modes=False)  # loads no compiled code
     first_steps.values(problem.flow.boxes.probes)
-    if isinstance(flow, YieldingFlow):
-        if problem.method.name == "proof":
-            from alphacut.frame.methods.yielding_proof import provable_frame
-
-            provable_frame(flow, problem.flow.boxes)
-    elif problem.method.name in ("proof", "dual"):
-        proof = cast("Proof | DualProof", problem.method)
-        with refusing():
-            proof.forecast(exact_flow(flow), problem.flow.boxes)
+    problem.method.require_possible(flow, problem.flow.boxes)
 
 
 def _proved(over: UnitFlow, proof: Proof, tick: Progress) -> Envelope | None:

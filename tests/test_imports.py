@@ -178,7 +178,13 @@ def test_a_case_that_is_refused_imports_no_stages_and_a_missing_file_no_sections
     assert not {name for name in known["no.toml"] if name.startswith(("alphacut.case", "pydantic"))}
     refused = known["cases/building.toml"]
     assert "alphacut.case.content" in refused
-    slow = ("scipy", "numba", "alphacut.stages", "alphacut.frame.methods", "alphacut.commands.case")
+    slow = (
+        "scipy",
+        "numba",
+        "alphacut.stages",
+        "alphacut.frame.propagation",
+        "alphacut.commands.case",
+    )
     assert not {name for name in refused if name.startswith(slow)}
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence, Set
+from contextlib import contextmanager
 from math import inf, isfinite, nan
 from numbers import Integral, Real
 from os import PathLike
@@ -289,6 +290,20 @@ def require(holds: bool | np.bool_, key: str, value: object, allowed: str, cure:
     """Raise `RefusedError(key, value, allowed, cure)` unless the condition `holds`."""
     if not holds:
         raise RefusedError(key, value, allowed, cure)
+
+
+@contextmanager
+def by_keys(key_of: Callable[[str], str]) -> Iterator[None]:
+    """Return a context manager that gives each RefusedError of its block another key.
+
+    Args:
+        key_of: Function that makes the key which a user knows from the name of an argument.
+    """
+    try:
+        yield
+    except RefusedError as error:
+        key = key_of(error.key)
+        raise RefusedError(key, error.value, error.allowed, error.cure, error.place) from None
 
 
 def require_ordered(what: str, lower: Array | float, upper: Array | float) -> None:

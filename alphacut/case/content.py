@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import cached_property, partial
 from pathlib import Path
 
-from alphacut.base.errors import RefusedError, require, require_choice
+from alphacut.base.errors import RefusedError, by_keys, require, require_choice
 from alphacut.case.analyses import ANALYSES
 from alphacut.case.cell import CellContent
 from alphacut.case.generated import AnalysisSection, QuestionSection
@@ -18,7 +18,8 @@ from alphacut.case.parse import ParsedCase, parse
 from alphacut.case.structure import MaterialDamping, Structure, StructureSection
 from alphacut.case.structures import STRUCTURES, with_structures
 from alphacut.case.types import AtFirstUse, require_alone
-from alphacut.frame import Limit
+from alphacut.frame import METHODS, Limit
+from alphacut.frame.methods.method import require_kinks
 from alphacut.frame.structures.storey import yields
 from alphacut.fuzzy import FuzzyNumber
 
@@ -309,16 +310,12 @@ class Content(CellContent):
                 output or duration does not fit; two studies have the same name; no modulus is known
                 or computed; a limit does not fit; or [identify] has no frame.
         """
-        # Where columns begin to yield, the response has kinks as a function of the inputs. The dual
-        # bound and Graph Followers need derivatives. Sampling needs none, and the proof of one
-        # storey encloses the events.
-        if yields(structure.model):
-            allowed = "auto, proof or quasi-monte-carlo where columns yield"
-            is_possible = envelope.method in ("auto", "proof", "quasi-monte-carlo")
-            require(is_possible, "envelope.method", envelope.method, allowed)
-            is_exact = envelope.integrator != "midpoint"
-            allowed = "exact where columns yield"
-            require(is_exact, "envelope.integrator", envelope.integrator, allowed)
+        with by_keys("envelope.{}".format):
+            require_kinks(structure.model, METHODS[envelope.method])
+            if envelope.integrator is not None:
+                from alphacut.frame.dynamics.nonlinear import make_flow  # takes time to import
+
+                make_flow(structure.model, (), envelope.step, envelope.step, envelope.integrator)
         # [envelope] is checked even where studies take its place, since questions are about its
         # response. It has no name, which validation of a study would ask for.
         main_study = Study.model_construct(fuzzy=envelope.fuzzy, duration=envelope.duration)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import MISSING, asdict, fields, replace
 from functools import cache, reduce
 from operator import or_
@@ -15,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Self, Union, cast, get_args, get_or
 from pydantic import Field, ValidationInfo, create_model
 
 from alphacut.base import quantity
-from alphacut.base.errors import RefusedError, require
+from alphacut.base.errors import by_keys, require
 from alphacut.case.limits import AnyLimit, CaseLimit, Limits
 from alphacut.case.structure import Structure
 from alphacut.case.types import Levels, Names, OneOrMany, Quantity, Section, case_file, text
@@ -114,25 +113,21 @@ class MadeSection(Section):
     def require_consistent(self) -> None:
         """Refuse what fields forbid each other."""
         super().require_consistent()
-        with self.by_its_keys():
+        with by_keys(self.key_of):
             _ = self.made
 
-    @contextmanager
-    def by_its_keys(self) -> Iterator[None]:
-        """Name the key of the case in each RefusedError of the block, in place of an argument.
+    def key_of(self, argument: str) -> str:
+        """Return the key of the case for an argument.
 
         Fields are keys of the section, and "limit of …" is one of its limits. What is no key, as
         "structure", stands behind the name of the section. Keys of other sections have a point.
         """
-        try:
-            yield
-        except RefusedError as error:
-            name = "limits" if error.key.startswith("limit of") else error.key
-            if name in type(self).model_fields:
-                name = f"{self.key}.{name}"
-            elif "." not in name and name != self.key:
-                name = f"{self.key}: {name}"
-            raise RefusedError(name, error.value, error.allowed, error.cure) from None
+        name = "limits" if argument.startswith("limit of") else argument
+        if name in type(self).model_fields:
+            return f"{self.key}.{name}"
+        if "." in name or name == self.key:
+            return name
+        return f"{self.key}: {name}"
 
 
 class AnalysisSection(MadeSection):
@@ -166,7 +161,7 @@ class AnalysisSection(MadeSection):
             structure: Structure of the case.
             components: Number of components of the records that will move it; 0 without records.
         """
-        with self.by_its_keys():
+        with by_keys(self.key_of):
             self.question(structure).require(structure.model, components)
         # A modulus E that stage modulus computes is still crisp here, and may be random in the run.
         random = [name for name in getattr(self, "random", ()) if name != "E"]
@@ -190,7 +185,7 @@ class AnalysisSection(MadeSection):
             fuzzy: Names of the fuzzy inputs of [envelope].
         """
         asked = Asked(structure.model, structure.inputs(fuzzy), (0.0,))
-        with self.by_its_keys():
+        with by_keys(self.key_of):
             self.question(structure).require_computable(asked)
 
 
@@ -248,7 +243,7 @@ class QuestionSection(AnalysisSection):
         limits = tuple(limit.limit(structure, key) for limit in self.limits)
         structure.require_quantities(key, list(dict.fromkeys(x.output for x in self.limits)))
         # Refuses limits that do not fit each other or the question; () stands for any outputs.
-        with self.by_its_keys():
+        with by_keys(self.key_of):
             limits_by_name(limits, (), magnitudes=self.made_from.needs_magnitudes)
         return limits
 

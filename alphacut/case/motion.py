@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, ValidationInfo
 
@@ -21,7 +21,13 @@ from alphacut.case.types import (
     after,
     text,
 )
+from alphacut.frame import METHODS
 from alphacut.io import quantity
+
+if TYPE_CHECKING:
+    MethodName = str
+else:
+    MethodName = Literal[tuple(METHODS)]
 
 
 @dataclass(frozen=True)
@@ -95,9 +101,7 @@ class EnvelopeSection(Section):
 
     fuzzy: Names
     alpha: Levels = ALPHA
-    method: Literal[
-        "auto", "proof", "dual", "graph-follower", "improved-graph-follower", "quasi-monte-carlo"
-    ] = "auto"
+    method: MethodName = "auto"
     integrator: Literal["midpoint", "exact"] | None = None
     tolerance: Annotated[Tolerance, text(_parse_tolerance)] | None = None
     gain: Annotated[float, Quantity(minimum=1e-6, maximum=1)] = 0.25

@@ -34,9 +34,6 @@ from alphacut.stages.store import Stage, StageContext, StageResult
 if TYPE_CHECKING:
     import xarray
 
-FOLLOWERS = ("graph-follower", "improved-graph-follower")
-PROOFS = ("auto", "proof", "dual")
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class EnvelopeResult:
@@ -192,7 +189,7 @@ class EnvelopeTask:
         arguments = self.arguments(structure)
         learned = structure.learned
         linear = structure.linear
-        is_proof = self.section.method in PROOFS
+        is_proof = frame.METHODS[self.section.method].is_exact
         if learned and linear and is_proof and set(arguments["inputs"]) == set(learned.names):
             outputs = dict.fromkeys((*structure.outputs, *outputs_of(self.limited)))
             structure.require_quantities("limits", tuple(outputs))
@@ -270,20 +267,21 @@ class EnvelopeTask:
                 output.
         """
         section = self.section
-        method = self.section.method
+        method = section.method
+        of_method = frame.METHODS[method]
         arguments = {**self._response(structure), "model": structure.model, "method": method}
         arguments["integrator"] = section.integrator
         # Without a tolerance in the case, method auto takes any guaranteed bounds as they are: a
         # tolerance that nobody asked for would make it search on.
         takes_any_gap = method == "auto" and section.tolerance is None
-        if not takes_any_gap and hasattr(frame.METHODS[method], "tolerance"):
+        if not takes_any_gap and hasattr(of_method, "tolerance"):
             tolerance = self.tolerance(structure).value
             # A follower takes it as the smallest gain for which it computes a trajectory. Gains of
             # several trajectories add up, so that each may be a fraction of the tolerance only.
-            if method in FOLLOWERS:
+            if of_method.tolerance_is_gain:
                 tolerance *= section.gain
             arguments["tolerance"] = tolerance
-        if method in ("auto", "proof") and self.limits:
+        if self.limits and hasattr(of_method, "thresholds"):
             arguments["thresholds"] = thresholds_of(structure.model, self.limits)
         return arguments
 
@@ -396,6 +394,7 @@ def require_tolerance(
             continue
         what = f"the error of {name} is {error:.2g}; the case allows {allowed.value:.2g}"
         cure = "method auto, or a smaller envelope.step, reaches it"
-        if structure.linear is not None and task.section.method not in FOLLOWERS:
+        is_gain = frame.METHODS[task.section.method].tolerance_is_gain
+        if structure.linear is not None and not is_gain:
             raise FailedError(what, cure)
         say(f"warning: {what}; {cure}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from alphacut.base.errors import RefusedError, require
+from alphacut.base.errors import by_keys, require
 from alphacut.case.motion import Identify
 from alphacut.case.structure import Structure
 from alphacut.frame import LearnedInputs, identify, read_modes
@@ -58,21 +58,10 @@ def _arguments(section: Identify, structure: Structure, alpha: tuple[float, ...]
     # A level α is the probability that the scatter of a measurement alone takes it as far from the
     # truth. Normal scatter is unbounded, so that a level of 0 would exclude nothing.
     require(alpha[0] > 0, "envelope.alpha", value=list(alpha), allowed="levels above 0")
-    try:
-        modes = read_modes(
-            section.measured,
-            frequency_deviation=section.frequency_deviation,
-            shape_deviation=section.shape_deviation,
-            floors=section.floors,
-            frequency_unit=section.frequency_unit,
-            override=section.override,
-        )
-    except RefusedError as error:
-        # The reader names arguments, which are keys of the section, or places in the file.
-        key = error.key
-        if key in type(section).model_fields:
-            key = f"identify.{key}"
-        raise RefusedError(key, error.value, error.allowed, error.cure) from None
+    options = ("frequency_deviation", "shape_deviation", "floors", "frequency_unit", "override")
+    # The reader names arguments, which are keys of the section, or places in the file.
+    with by_keys(lambda name: f"identify.{name}" if name in type(section).model_fields else name):
+        modes = read_modes(section.measured, **{name: getattr(section, name) for name in options})
     inputs = structure.inputs(section.learn, "identify.learn")
-    options = {"held_out": section.held_out, "alpha": alpha}
-    return {"frame": structure.model, "inputs": inputs, "modes": modes, **options}
+    further = {"held_out": section.held_out, "alpha": alpha}
+    return {"frame": structure.model, "inputs": inputs, "modes": modes, **further}

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import require_choice
+from alphacut.base.errors import require, require_choice
 from alphacut.base.kernels import compiled
 from alphacut.frame.calculus.box_quadratic import solve_in_place
 from alphacut.frame.calculus.polynomials import Jet
@@ -83,7 +83,7 @@ def make_flow(
     if isinstance(integrator, Integrator):
         name = integrator.name
     if yields(model):
-        require_choice("integrator", name or "exact", ["exact"])
+        require(name in (None, "exact"), "integrator", name, "exact where columns yield")
         return YieldingFlow(model, tuple(names), duration, step)
     if has_matrices(model):
         scheme = integrator or "exact"

@@ -22,7 +22,8 @@ from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.identification.enclosure import enclosure
 from alphacut.frame.identification.identify import Evidence, Identified, RefutedError
 from alphacut.frame.identification.modes import chain_modes
-from alphacut.frame.propagation import Method, envelope
+from alphacut.frame.methods.method import Method
+from alphacut.frame.propagation import envelope
 from alphacut.frame.result import Ends, Envelope
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.verification.self_test import with_motions_tested

@@ -30,6 +30,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.methods.improved_follower import ImprovedFollower, PassBounds
+from alphacut.frame.methods.method import Method
 from alphacut.frame.methods.sampled import PeakSearch
 from alphacut.frame.numbers import WIDE
 from alphacut.frame.result import Ends, Envelope
@@ -47,7 +48,7 @@ FEW_INPUTS = 4
 
 
 @dataclass(frozen=True)
-class Auto:
+class Auto(Method):
     """The automatic choice of a method, and its options.
 
     Args:
@@ -69,6 +70,8 @@ class Auto:
     """
 
     name: ClassVar[str] = "auto"
+    takes_kinks: ClassVar[bool] = True
+    is_exact: ClassVar[bool] = True
     tolerance: float | None = None
     seed: int = 0
     workers: int | None = None

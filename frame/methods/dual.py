@@ -21,12 +21,13 @@ from alphacut.base.errors import checked_number
 from alphacut.base.progress_bar import Progress, nth_subprogress, subprogress
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box import Box, prune_ends, remainder_addition
-from alphacut.frame.bounds.box_proof import Answer, BoxBounds, Goal, PrunedPeaks
+from alphacut.frame.bounds.box_proof import Answer, BoxBounds, Goal, PrunedPeaks, refusing
 from alphacut.frame.bounds.level import LevelModels, OutputBounds, improve_all, least_peak
 from alphacut.frame.bounds.spatial_branch_and_bound import halvings, prove
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.flow import Flow, LinearFlow, exact_flow
+from alphacut.frame.methods.method import Method
 from alphacut.frame.result import Ends, Envelope
 from alphacut.frame.structures.linear import frequencies
 from alphacut.frame.verification.rounding import rounding_margin
@@ -39,7 +40,7 @@ Problems = dict[tuple[int, int], OutputBounds]
 
 
 @dataclass(frozen=True)
-class DualProof:
+class DualProof(Method):
     """The dual bound as a method, and its options.
 
     Args:
@@ -58,6 +59,7 @@ class DualProof:
     """
 
     name: ClassVar[str] = "dual"
+    is_exact: ClassVar[bool] = True
     gap: float = 2e-3
     peaks: float = 0.019
     below: float = 0.1
@@ -94,6 +96,11 @@ class DualProof:
     def peak_gap(self, flow: UnitFlow) -> Array:
         """Return the gap that suffices at the peak of each output, shape (outputs,)."""
         return self.peaks * flow.peak
+
+    def require_possible(self, flow: Flow, boxes: Boxes) -> None:
+        """Refuse a structure without a proof, with `forecast`."""
+        with refusing():
+            self.forecast(exact_flow(flow), boxes)
 
     def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
         """Return the largest number of evaluations of the dual function for one bound.

@@ -22,6 +22,7 @@ from alphacut.base.errors import checked_number, require
 from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import gain, local_maximum
+from alphacut.frame.methods.method import Method
 from alphacut.frame.methods.sampled import (
     SAFETY,
     independent_excess,
@@ -195,7 +196,7 @@ class FollowedSteps:
 
 
 @dataclass(frozen=True)
-class GraphFollower:
+class GraphFollower(Method):
     """Graph Follower: envelopes of any structure from few trajectories ("graphs").
 
     At each time node, Taylor models of the graphs computed so far point to the inputs at which the
@@ -212,6 +213,7 @@ class GraphFollower:
     """
 
     name: ClassVar[str] = "graph-follower"
+    tolerance_is_gain: ClassVar[bool] = True
     order: int = 2
     tolerance: float = 1e-3
 

@@ -25,6 +25,7 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import global_maximum, local_maximum
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.methods.graph_follower import Places, Storage, estimated_envelope
+from alphacut.frame.methods.method import Method
 from alphacut.frame.methods.sampled import SAFETY, independent_excess, largest_values, spread_points
 from alphacut.frame.result import Envelope
 from alphacut.frame.structures.linear import frequencies
@@ -39,7 +40,7 @@ LEAST_GAIN = 1e-10
 
 
 @dataclass(frozen=True)
-class ImprovedFollower:
+class ImprovedFollower(Method):
     """The improved Graph Follower and its options.
 
     Args:
@@ -54,6 +55,7 @@ class ImprovedFollower:
     """
 
     name: ClassVar[str] = "improved-graph-follower"
+    tolerance_is_gain: ClassVar[bool] = True
     tolerance: float = 7e-4
     budget: int = 5000
     seed: int = 0

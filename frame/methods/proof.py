@@ -25,7 +25,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number
 from alphacut.base.progress_bar import Progress
 from alphacut.frame import numbers
-from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds, Goal
+from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds, Goal, refusing
 from alphacut.frame.bounds.branch_and_bound import (
     Optima,
     bound_problems,
@@ -35,9 +35,10 @@ from alphacut.frame.bounds.branch_and_bound import (
 from alphacut.frame.bounds.spatial_branch_and_bound import halvings, prove
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, MAX_PARAMETERS, Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.flow import Flow, LinearFlow, exact_flow
 from alphacut.frame.dynamics.yielding import YieldingFlow
-from alphacut.frame.methods.yielding_proof import YIELDING_GAP, prove_yielding
+from alphacut.frame.methods.method import Method
+from alphacut.frame.methods.yielding_proof import YIELDING_GAP, provable_frame, prove_yielding
 from alphacut.frame.modes.damped import require_dissipation
 from alphacut.frame.modes.modal_model import ModalModel, error_fractions
 from alphacut.frame.modes.modes import FittedModel, as_oscillators, fitted_model
@@ -49,7 +50,7 @@ LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Proof:
+class Proof(Method):
     """Branch and bound as a method, and its options.
 
     Args:
@@ -71,6 +72,8 @@ class Proof:
     """
 
     name: ClassVar[str] = "proof"
+    takes_kinks: ClassVar[bool] = True
+    is_exact: ClassVar[bool] = True
     gap: float | None = None
     tolerance: float | None = None
     boxes: float = 4000
@@ -123,6 +126,14 @@ class Proof:
         if self.gap:
             return (self.gap,)
         return (0.1 * tolerance, tolerance)
+
+    def require_possible(self, flow: Flow, boxes: Boxes) -> None:
+        """Refuse a structure without a proof, with `forecast`, or `provable_frame` if it yields."""
+        if isinstance(flow, YieldingFlow):
+            provable_frame(flow, boxes)
+        else:
+            with refusing():
+                self.forecast(exact_flow(flow), boxes)
 
     def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
         """Return the expected work on a box, in evaluations of the response of a mode at a node.

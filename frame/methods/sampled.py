@@ -13,6 +13,7 @@ from alphacut.base.errors import checked_number
 from alphacut.base.progress_bar import Progress
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.dynamics.yielding import YieldingFlow
+from alphacut.frame.methods.method import Method
 from alphacut.frame.result import Envelope
 from alphacut.fuzzy.campaign.call import Call, SpentError
 from alphacut.fuzzy.result import Nature
@@ -26,7 +27,7 @@ predict (tuned on random structures; a larger one overestimates errors)."""
 
 
 @dataclass(frozen=True)
-class Sampled:
+class Sampled(Method):
     """Attained bounds of a number of quasi-random trajectories on each level.
 
     Args:
@@ -38,6 +39,7 @@ class Sampled:
     """
 
     name: ClassVar[str] = "quasi-monte-carlo"
+    takes_kinks: ClassVar[bool] = True
     samples: int = 1024
     seed: int = 0
 
