@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, PlainValidator, ValidationInfo, model_validator
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, require
+from alphacut.base.errors import RefusedError, by_keys, require
 from alphacut.case.structure import (
     LOSS_STAND_IN,
     DampingRatios,
@@ -41,7 +41,6 @@ from alphacut.frame import (
     read_matrix,
     read_unknowns,
 )
-from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.structures.matrix import Monomial, modal_energy_fractions, require_symmetric
 from alphacut.frame.structures.quantities import Output, require_names
 from alphacut.frame.structures.read_matrix import HELD_STIFFNESS, MAX_ROWS
@@ -381,7 +380,7 @@ class MatricesSection(StructureSection):
             place = ("displacement", "velocity", "acceleration").index(output.of)
             rows[Output(name, output.si_unit)] = np.append(np.zeros(place * len(row)), row)
         patterns = self._ground_patterns()
-        try:
+        with by_keys("matrices: {}".format):
             model = MatrixStructure(
                 {name: number.nominal for name, number in numbers.items()},
                 mass=self.mass,
@@ -402,9 +401,6 @@ class MatricesSection(StructureSection):
                 numbers |= ratios
                 nominal = {name: number.nominal for name, number in numbers.items()}
                 model = replace(model, parameters=nominal, ratios=tuple(ratios))
-        except RefusedError as error:
-            key = f"matrices: {error.key}"
-            raise RefusedError(key, error.value, error.allowed, error.cure) from None
         units = {name: unit for name, (_, unit) in self.parameters.items()}
         return Structure(model, numbers, input_units=units)
 
@@ -414,7 +410,10 @@ class MatricesSection(StructureSection):
         Args:
             structure: The structure, of which the masses that directions move are compared.
         """
-        yield from self._direction_warnings(structure)
+        if structure is not None and isinstance(structure.model, MatrixStructure):
+            from alphacut.frame.analyses.doubts import direction_doubts  # takes time to import
+
+            yield from (f"matrices.directions: {x}" for x in direction_doubts(structure.model))
         used = set[str]()
         for factor, _ in (*self.mass, *self.stiffness, *self.damping):
             used.update(dict(factor.powers))
@@ -441,25 +440,6 @@ class MatricesSection(StructureSection):
                     f"the files of matrices.{key} do not name {len(missing)} unknowns that those "
                     f"of {other} name, whose rows are zeros: {shown}; is a file cut off?"
                 )
-
-    def _direction_warnings(self, structure: Structure | None) -> Iterator[str]:
-        """Yield a sentence on two horizontal directions that are no motions of one ground.
-
-        They are at right angles where ι₁ᵀ M ι₂ = 0 for the influence vectors ι, and move the same
-        mass.
-        """
-        if len(self.directions) < 2 or structure is None or structure.linear is None:
-            return
-        matrices, _ = evaluate(structure.linear, (), np.zeros((1, 0)), derivatives=False)
-        patterns = np.array(self._ground_patterns()[:2])
-        moved = patterns @ matrices.mass.value[0] @ patterns.T
-        first, second = map(float, moved.diagonal())
-        doubt = "is a sign wrong, or an unknown missing?"
-        if abs(moved[0, 1]) > 1e-6 * np.sqrt(first * second):
-            yield f"matrices.directions: the first two are not at right angles: {doubt}"
-        elif abs(first - second) > 1e-6 * max(first, second):
-            masses = f"{first:,.0f} kg and {second:,.0f} kg"
-            yield f"matrices.directions: the first two move {masses}: {doubt}"
 
     def _material_damping_ratios(
         self, damping: MaterialDamping, model: MatrixStructure, loss: FuzzyNumber

@@ -8,11 +8,9 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any, Literal, cast
 
-import numpy as np
 from pydantic import PlainValidator, ValidationInfo
 
-from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, require
+from alphacut.base.errors import RefusedError, by_keys, require
 from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.case.types import Modulus, NotEmpty, OneOrMany, Quantity, Section, case_file, text
 from alphacut.frame import (
@@ -28,7 +26,7 @@ from alphacut.frame.structures.linear import LinearSystem, has_matrices
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.quantities import OF_STOREY_FRAME
 from alphacut.frame.structures.storey import SYMBOLS
-from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
+from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.io.files import suggestion
 
 
@@ -210,11 +208,9 @@ class Structure:
             RefusedError: With the first output that the model cannot have.
         """
         for name in names:
-            try:
+            # The model speaks of its own argument; the user wrote a key of the case.
+            with by_keys(lambda _: key):
                 self.model.require_quantity(name)
-            except RefusedError as error:
-                # The model speaks of its own argument; the user wrote a key of the case.
-                raise RefusedError(key, error.value, error.allowed) from None
 
 
 def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
@@ -353,25 +349,8 @@ class Isolator(Section):
         found = BilinearIsolator.of(
             mass, period=self.period, strength=strength, hardening=self.hardening
         )
-        above = len(masses) - 1
-        # A storey of hardening 1 is elastic whatever its yield point is.
-        never = Crisp(found.yield_force)
-        storeys: dict[str, tuple[FuzzyNumber, ...]] = {
-            "stiffness": (self._fuzzy(found.stiffness),),
-            "hardening": (Crisp(found.hardening), *[Crisp(1.0)] * above),
-        }
-        if self.linked:  # a crisp yield drift: the yield force is proportional to the stiffness
-            drift = Crisp(found.yield_force / found.stiffness)
-            storeys["yield_drift"] = (drift,) * (above + 1)
-        else:
-            storeys["yield_force"] = (self._fuzzy(found.yield_force), *[never] * above)
-        return storeys
-
-    def _fuzzy(self, nominal: float) -> FuzzyNumber:
-        """Return the fuzzy number between both factors of a nominal value."""
-        if self.lambda_min == self.lambda_max:
-            return Crisp(nominal)
-        return Triangular(self.lambda_min * nominal, nominal, self.lambda_max * nominal)
+        factors = (self.lambda_min, self.lambda_max)
+        return found.storeys(len(masses) - 1, factors, linked=self.linked)
 
 
 class Frame(StructureSection):
@@ -447,111 +426,20 @@ class Frame(StructureSection):
         return any(any(start.support) for start in (*self.displacements, *self.velocities))
 
     def warnings(self, structure: Structure | None) -> Iterator[str]:
-        """Yield a sentence for each doubtful unit and each weight that is left out (P-Delta).
-
-        Doubtful are masses, lengths, second moments, stiffnesses or yield forces of two storeys
-        that differ more than 300-fold, and a storey above 100 m. Weights are not judged if gravity
-        is part of the frame.
+        """Yield the doubts of `storey_doubts` by the keys of the section.
 
         Args:
             structure: The frame with its fuzzy parameters; None while its modulus is unknown: then
                 weights are not judged.
         """
-        # Wrong prefixes k, M and G are factors of a thousand and more, while an isolator is some 50
-        # times softer than a storey: 300 lies between both.
-        weight = STANDARD_GRAVITY * sum(x.nominal for x in self.per_floor(self.masses))
-        max_ratio = 300.0
-        for key in ("masses", "lengths", "second_moment", "stiffness", "yield_force"):
-            # Without values a single 1 stands for them, so that their ratio is 1.
-            sizes = [number.nominal for number in getattr(self, key) or (Crisp(1.0),)]
-            if key == "yield_force":
-                # A storey that is to stay elastic has a force that no motion reaches, such as 1 GN.
-                sizes = [size for size in sizes if size < 10 * weight] or [1.0]
-            if max(sizes) > max_ratio * min(sizes):
-                ratio = max(sizes) / min(sizes)
-                yield f"frame.{key} of two storeys differ {ratio:,.0f}-fold: is a unit wrong?"
-        tallest = max((height.nominal for height in self.lengths or ()), default=0.0)
-        if tallest > 100:  # m, ten times the height of a tall storey
-            yield f"frame.lengths has a storey of {tallest:g} m: is its unit right, m or mm?"
-            return
-        yield from self._size_warnings(tallest or 5.0, weight)  # m, a guess without heights
-        of_columns = ("shear", "base_shear", "overturning_moment")
-        shears = [x for x in self.outputs or () if x.rstrip("0123456789") in of_columns]
-        if shears and any(any(damper.support) for damper in self.dampers):
-            yield (
-                f"{', '.join(shears)}: forces of the columns, without those of the dampers,"
-                " which act on storeys and foundation, too"
-            )
-        if self.gravity or self.lengths is None or structure is None:
-            return
-        # The coefficients are the largest in the supports of all parameters: if they are small,
-        # the weights may be left out at every value that the inputs may have.
-        frame = cast("StoreyFrame", structure.model)
-        ends = {name: number.support for name, number in structure.numbers.items()}
-        coefficients = frame.stability_coefficients(ends)
-        yield from self._weight_warnings(coefficients)
-        yield from self._hardening_warnings(coefficients)
+        from alphacut.frame.analyses.doubts import storey_doubts  # takes time to import
 
-    def _size_warnings(self, height: float, weight: float) -> Iterator[str]:
-        """Yield a sentence for each start, yield drift, yield force or gravity of an unusual size.
-
-        Args:
-            height: Height of the tallest storey in m, or a guess.
-            weight: Weight of all floors in N.
-        """
-        # `per_floor` gives one value for each floor, where the case may state one for all.
-        starts = [x.nominal for x in self.per_floor(self.displacements)]
-        drift = np.abs(np.diff(starts, prepend=0.0)).max()
-        # storeys stand drifts of some 5 % of their height, and yield below 2 %
-        if drift > height / 4:
-            yield f"frame.displacements shear a storey by {drift:.3g} m: is a unit wrong?"
-        largest = max((x.nominal for x in self.yield_drift or ()), default=0.0)
-        if largest > height / 4:
-            yield f"frame.yield_drift is up to {largest:.3g} m: is its unit right?"
-        fraction = max((x.nominal for x in self.yield_force or ()), default=np.inf) / weight
-        # even isolators slide at some 2 % of the weight above them
-        if fraction < 0.002:
-            yield f"frame.yield_force is at most {fraction:.2g} of the weight: is its unit right?"
-        if self.gravity > 2 * STANDARD_GRAVITY:
-            yield f'frame.gravity is {self.gravity:g} m/s^2: write "1 g" or "9.81 m/s^2"'
-
-    def _weight_warnings(self, coefficients: Array) -> Iterator[str]:
-        """Yield a sentence for each storey whose weight should not be left out.
-
-        Args:
-            coefficients: Weight over stiffness and height of each storey, shape (floors,), the
-                largest that the inputs allow. From 1 on the storey buckles: then, and if all are
-                below 1e-5, a unit is doubted. Each storey between 0.1 and 1 has its own sentence.
-        """
-        lightest = 1e-5  # buildings have coefficients above 1e-4
-        largest = coefficients.max()
-        doubt = "are the units of stiffness, masses and lengths right?"
-        if largest >= 1:
-            what = f"the weight on storey {coefficients.argmax() + 1} is up to {largest:.3g} times"
-            yield f"{what} its stiffness times its height, and would buckle it: {doubt}"
-            return
-        if largest < lightest:
-            yield f"weights over stiffness and height of storeys are below {lightest:g}: {doubt}"
-        for z, coefficient in enumerate(coefficients, start=1):
-            if coefficient > 0.1:  # up to which EN 1998-1, 4.4.2.2, neglects P-Delta
-                what = f"weight over stiffness and height of storey {z} is up to {coefficient:.2g}"
-                yield f'{what}: say frame.gravity = "1 g", so that drifts grow by it (P-Delta)'
-
-    def _hardening_warnings(self, coefficients: Array) -> Iterator[str]:
-        """Yield a sentence for each storey of which the weight takes much of the hardening.
-
-        Args:
-            coefficients: Weight over stiffness and height of each storey, shape (floors,), the
-                largest that the inputs allow.
-        """
-        numbers = zip(coefficients, self.per_floor(self.hardening), strict=False)
-        for z, (coefficient, hardening) in enumerate(numbers, start=1):
-            left = hardening.support.lower
-            if left < 1 and coefficient > left / 4:  # tuned: drifts may grow by a third
-                yield (
-                    f"storey {z} yields to {left:.2g} of its stiffness, and its weight takes up to"
-                    f' {coefficient:.2g} (P-Delta): say frame.gravity = "1 g"'
-                )
+        known = self.nominal if structure is None else structure
+        supports = None
+        if structure is not None:
+            supports = {name: number.support for name, number in structure.numbers.items()}
+        for key, words in storey_doubts(cast("StoreyFrame", known.model), supports):
+            yield f"frame.{NAMES.get(key, key)} {words}" if key else words
 
     def per_floor(self, values: tuple[FuzzyNumber, ...] | None) -> tuple[FuzzyNumber, ...]:
         """Return one value for each floor; a single one holds for all of them."""
@@ -603,7 +491,7 @@ class Frame(StructureSection):
         # A number is the ratio of all modes; a tuple must have one ratio for each.
         if nominal := [ratio.nominal for ratio in ratios.values()]:
             arguments["damping_ratio"] = nominal[0] if len(nominal) == 1 else tuple(nominal)
-        try:
+        with by_keys(lambda name: f"frame.{NAMES.get(name, name)}"):
             model = StoreyFrame(
                 **arguments,
                 modulus=None if young is None else young.nominal,
@@ -616,10 +504,6 @@ class Frame(StructureSection):
                 # with that which a stage computes.
                 gravity=0.0 if young is STAND_IN else self.gravity,
             )
-        except RefusedError as error:
-            key = f"frame.{NAMES.get(error.key, error.key)}"
-            raise RefusedError(key, error.value, error.allowed, error.cure) from None
-
         stated: dict[str, FuzzyNumber | None] = {
             "E": young,
             "I": next(iter(self.second_moment or ()), None),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from math import degrees
 
 import numpy as np
@@ -11,21 +11,12 @@ from alphacut.base.number_text import STANDARD_GRAVITY, engineering, percent_tex
 from alphacut.case.content import Content
 from alphacut.case.loads import RecordsSection
 from alphacut.case.structure import Structure
-from alphacut.frame import Exact, LinearFlow, MatrixStructure
+from alphacut.frame import MatrixStructure
 from alphacut.frame.analyses.angles import TURN
-from alphacut.frame.analyses.peaks import WIDENING
-from alphacut.frame.analyses.suites import (
-    ROTATED,
-    NominalMode,
-    ScaledRecord,
-    nominal_mode,
-    short_record_warnings,
-)
-from alphacut.frame.boxes import AT_REST
-from alphacut.frame.result import within_steps
-from alphacut.frame.structures.linear import LinearSystem, NominalModes, histories
+from alphacut.frame.analyses.doubts import load_doubts, mode_doubts, step_doubts
+from alphacut.frame.analyses.suites import ROTATED, NominalMode, ScaledRecord, nominal_mode
+from alphacut.frame.structures.linear import NominalModes
 from alphacut.frame.structures.storey import yields
-from alphacut.frame.verification.step_error import node_deviation
 from alphacut.stages.envelope import tasks
 
 
@@ -54,24 +45,12 @@ def motion_text(
     duration = section.duration
     step = section.step
     moved = linear
-    for name, history in histories(linear).items():
-        # A load history whose first step is longer than the simulation acts as one straight line.
-        # This happens if its times are in another unit, such as ms.
-        if len(history.samples) > 2 and history.step > duration:
-            text += (
-                f"warning: {name}: the motion ends before the second sample, at {history.step:g}"
-            )
-            text += " s: are its times in another unit than s?\n"
     if (record := linear.ground) is not None:
         peak = record.extremes[0]  # the largest magnitude; the other entry is that of its slope
         sizes = f"peak {engineering(peak, 'm/s^2')}, {peak / STANDARD_GRAVITY:.3g} g"
         text += f"record: {len(record.samples)} samples of {record.step:g} s, {sizes}\n"
-        length = record.step * (len(record.samples) - 1)
-        # The modes are needed only for a record that ends before the motion does.
-        if length < duration:
-            short = short_record_warnings("the record", length, nominal_mode(linear).period)
-            text += "".join(f"warning: {line}\n" for line in short)
-    text += "".join(f"warning: {line}\n" for line in load_end_warnings(content, structure))
+    longest = max(task.duration for task in tasks(section, content.study))
+    text += warning_lines(load_doubts(linear, longest))
     if content.records is not None:
         from alphacut.stages.suite import scaled_suite
 
@@ -88,7 +67,12 @@ def motion_text(
         moved = linear.moved_by(strongest.ground)
     # The first steps of a very long response are enough, and `check` is to end in seconds.
     duration = min(duration, 16_000 * step)
-    return text + "".join(f"warning: {line}\n" for line in long_steps(moved, duration, step))
+    return text + warning_lines(step_doubts(moved, duration, step))
+
+
+def warning_lines(doubts: Iterable[str]) -> str:
+    """Return a line "warning: …" for each doubt, with its line end."""
+    return "".join(f"warning: {doubt}\n" for doubt in doubts)
 
 
 def modes_document(modes: NominalModes) -> dict[str, object]:
@@ -132,23 +116,8 @@ def modes_text(
     first = float(periods[0])
     shown = f"{first:.4g} s" if modes.frequencies[0] else "infinite"
     text = f"first natural period: {shown}, at the most plausible values\n"
-    # Parts of machines have periods of some 1 ms, one-storey buildings 0.05 s, the highest towers
-    # 10 s.
-    shortest = 1e-3
-    if is_shaken:
-        shortest = 0.02
-    if not modes.frequencies[0]:
-        text += "warning: a mode has no stiffness within rounding: are units right, and all parts"
-        text += " joined?\n"
-    elif not shortest <= first <= 10.0:
-        text += f"warning: {first:.4g} s is an unusual period: are units right, mass and stiffness"
-        text += " not exchanged?\n"
+    text += warning_lines(mode_doubts(modes, is_shaken=is_shaken))
     has_stiffness = modes.frequencies > 0  # without, a mode has no damping ratio
-    largest = float(modes.damping_ratios.max(where=has_stiffness, initial=0.0))
-    doubt = "are units of dampers, damping matrices and rayleigh factors right?"
-    # ratios of structures are .1 to 60 %, of an undamped one below the rounding of 1e-12
-    if largest > 1 or 1e-12 < largest < 1e-5:
-        text += f"warning: damping ratios are up to {largest:.2g} of critical: {doubt}\n"
     moved = modes.moved_mass
     directions = [x.effective_masses / (x.moved_mass or np.inf) for x in (modes, *others)]
     # Building codes ask for the modes that have 90 % of the mass (EN 1998-1, 4.3.3.3.1).
@@ -186,54 +155,6 @@ def matrices_text(model: MatrixStructure, unknowns: Sequence[str], modes: Nomina
         text += f": {', '.join(massless[:8])}{', …' * (len(massless) > 8)}"
     periods = [engineering(float(period), "s") for period in modes.periods[:5]]
     return f"{text}\nfirst periods: {', '.join(periods)}\n"
-
-
-def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[str]:
-    """Yield a sentence for each output whose peak may rise by over 1 % between time nodes.
-
-    The peak, and what responses add to it between nodes, are computed for the most plausible
-    structure. Where columns yield, peaks of accelerations alone are read at the nodes, so that only
-    they are judged, by the response with the initial stiffness.
-
-    Args:
-        linear: A linear structure, or a frame that yields.
-        duration: Length of the response, in s.
-        step: Distance of the nodes, in s.
-
-    Raises:
-        FailedError: The response could not be computed.
-    """
-    has_events = yields(linear)
-    if has_events:
-        read_at_nodes = [name for name in linear.outputs if linear.unit_of(name) == "m/s^2"]
-        if not read_at_nodes:
-            return
-        linear = linear.with_outputs(read_at_nodes).elastic()
-    flow = LinearFlow(linear, (), duration, step, Exact(), by_modes=False)
-    nominal = np.zeros((1, 0))  # the one structure without fuzzy inputs
-    at_nodes = np.abs(flow.values(nominal)[0]).T  # (outputs, times)
-    between = node_deviation(flow, nominal).T  # what each step may add, of the same shape
-    # The peak of a structure at rest is rounding alone. It is replaced by AT_REST, a billionth, of
-    # `reach`: the size that the energy of the response allows, shape (outputs,).
-    peaks = np.maximum(at_nodes.max(axis=1), AT_REST * flow.reach())
-    # If nothing moves at all, peaks are 0, and the ratio of 1 says that nothing is widened.
-    farthest = within_steps(at_nodes, between).max(axis=1)
-    widening = np.divide(farthest, peaks, out=np.ones_like(peaks), where=peaks > 0) - 1
-    for name, fraction in zip(linear.outputs, widening, strict=True):
-        if fraction <= WIDENING:
-            continue
-        if has_events:
-            what = f"the step of {step:g} s is too coarse: its peak may be missed"
-            by_how_much = f"by about {fraction:.1%}"
-            if fraction >= 1:
-                by_how_much = "altogether"
-            yield f"{name}: {what} {by_how_much} between nodes"
-        else:
-            # This is the deviation of one structure. A bound over wide inputs may contain several
-            # times as much, which only its computation tells.
-            what = f"between time nodes {step:g} s apart the most plausible structure may add"
-            bound = "a bound over all inputs may contain several times as much"
-            yield f"{name}: {what} {fraction:.1%} to its peak; {bound}"
 
 
 def records_text(
@@ -276,42 +197,9 @@ def records_text(
         if not section.has_all_angles:
             angle = f"turned by {degrees(section.angle):.4g}°"
         text += f"{section.component_count} components a record, {angle}. {TURN}\n"
-    return text + "".join(f"warning: {x}\n" for record in records for x in record.warnings)
+    return text + warning_lines(x for record in records for x in record.warnings)
 
 
 def _in_g(acceleration: float) -> str:
     """Return an acceleration in m/s² as text in g with three digits."""
     return f"{acceleration / STANDARD_GRAVITY:.3g} g"
-
-
-def load_end_warnings(content: Content, structure: Structure) -> Iterator[str]:
-    """Yield a warning of each load that does not end as the responses do.
-
-    Warned of are an accelerogram that goes on after all responses have ended, and a force that is
-    not zero where its file ends, before the longest response does: it jumps to zero there. There
-    are no warnings without [envelope], or if the structure is not linear.
-
-    Args:
-        content: The case, for the durations of [envelope] and its studies.
-        structure: Its structure.
-    """
-    linear = structure.linear
-    if linear is None or content.envelope is None:
-        return
-    longest = max(task.duration for task in tasks(content.envelope, content.study))
-    for name, history in histories(linear).items():
-        end = history.start + history.step * (len(history.samples) - 1)
-        largest, _ = history.extremes
-        # Records and measured forces fade away: 1 % of the largest value is no jump (tuned). The
-        # last value of a history that `is_held` stays on, so that it does not jump either.
-        jumps = abs(history.samples[-1]) > 0.01 * largest and not history.is_held
-        if history is linear.ground:
-            if end > longest * (1 + 1e-9):
-                yield f"the record lasts {end:g} s, and the motion is computed for {longest:g} s"
-        elif jumps and end < longest * (1 - 1e-9):
-            fraction = percent_text(float(abs(history.samples[-1])) / largest)
-            yield (
-                f"{name} ends at {end:g} s with {fraction} of its largest value, and is 0 from"
-                f" then on, while the motion is computed for {longest:g} s: let its file last as"
-                " long, or end with 0"
-            )

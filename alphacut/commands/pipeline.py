@@ -22,8 +22,8 @@ from alphacut.case.material import RadiusMapSection
 from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
-from alphacut.commands.motion_text import load_end_warnings
 from alphacut.commands.options import read_case
+from alphacut.frame.analyses.doubts import load_doubts
 from alphacut.frame.analyses.fragility import FragilityQuestion
 from alphacut.frame.analyses.peaks import Peak, Peaks
 from alphacut.frame.analyses.question import Asked
@@ -328,14 +328,16 @@ class Pipeline:
         """
         results = self.results
         content = self.content
-        for warning in load_end_warnings(content, structure):
-            say(f"warning: {warning}")
         results.tasks = envelope.tasks(
             section,
             content.study,
             content.limited_outputs,
             content.limits_where_yielding(structure),
         )
+        if structure.linear is not None:
+            longest = max(task.duration for task in results.tasks)
+            for doubt in load_doubts(structure.linear, longest):
+                say(f"warning: {doubt}")
         # The longest tasks begin, so that none of them is left to the end alone. Their time grows
         # about as inputs times duration.
         longest_first = sorted(results.tasks, key=lambda task: -len(task.fuzzy) * task.duration)

@@ -6,6 +6,7 @@ from math import pi
 from typing import NamedTuple
 
 from alphacut.base.errors import checked_number, require
+from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
 
 
 class BilinearIsolator(NamedTuple):
@@ -52,3 +53,37 @@ class BilinearIsolator(NamedTuple):
         require(hardening < 1, "hardening", value=f"{hardening:g}", allowed="below 1")
         stiffness = mass * (2 * pi / period) ** 2 / hardening
         return cls(stiffness, strength / (1 - hardening), hardening)
+
+    def storeys(
+        self, above: int, factors: tuple[float, float], *, linked: bool
+    ) -> dict[str, tuple[FuzzyNumber, ...]]:
+        """Return numbers of a `StoreyFrame` on isolators, by the names of its arguments.
+
+        Args:
+            above: Number of storeys above the isolators, which stay elastic.
+            factors: Smallest and largest property modification factor λ of stiffness and strength
+                (ASCE 7, chapter 17).
+            linked: Whether one factor holds for both, so that the stiffness alone is fuzzy.
+
+        Returns:
+            Stiffness of the isolated storey, and yield points and hardening of all storeys.
+        """
+        stiffness = _between(self.stiffness, factors)
+        force = _between(self.yield_force, factors)
+        # A storey of hardening 1 is elastic whatever its yield point is.
+        storeys: dict[str, tuple[FuzzyNumber, ...]] = {
+            "stiffness": (stiffness,),
+            "hardening": (Crisp(self.hardening), *[Crisp(1.0)] * above),
+        }
+        if linked:  # a crisp yield drift: the yield force is proportional to the stiffness
+            drift = Crisp(self.yield_force / self.stiffness)
+            return storeys | {"yield_drift": (drift,) * (above + 1)}
+        return storeys | {"yield_force": (force, *[Crisp(self.yield_force)] * above)}
+
+
+def _between(nominal: float, factors: tuple[float, float]) -> FuzzyNumber:
+    """Return the fuzzy number between both factors of a nominal value."""
+    smallest, largest = factors
+    if smallest == largest:
+        return Crisp(nominal)
+    return Triangular(smallest * nominal, nominal, largest * nominal)
