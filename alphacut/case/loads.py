@@ -10,10 +10,9 @@ from math import inf, isfinite, radians
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, cast
 
-import numpy as np
 from pydantic import Field, ValidationInfo
 
-from alphacut.base.errors import RefusedError, is_number, require, require_choice
+from alphacut.base.errors import RefusedError, by_keys, is_number, require, require_choice
 from alphacut.base.units import ACCELERATION, factor_of
 from alphacut.case.generated import section_at
 from alphacut.case.structure import Structure
@@ -29,6 +28,7 @@ from alphacut.case.types import (
     text,
 )
 from alphacut.frame import History, StoreyFrame
+from alphacut.frame.records.components import require_one_ground
 from alphacut.frame.records.recording import Baseline, Recording
 from alphacut.frame.records.suite import MAX_RECORDS, read_recordings, require_distinct
 from alphacut.frame.records.text_file import ACCELERATION_UNITS, require_stated_step
@@ -357,20 +357,6 @@ def _parse_angle(value: object, _: ValidationInfo) -> float:
 Files = Annotated[tuple[tuple[Recording, ...], ...], text(_read_suite)]
 
 
-def _require_one_ground(first: Recording, other: Recording) -> None:
-    """Refuse two components of one record with other steps, or with the same samples.
-
-    Raises:
-        RefusedError: Their steps differ, or all samples agree.
-    """
-    ends = [f"{x.name} of {len(x.samples)} samples every {x.step:g} s" for x in (first, other)]
-    allowed = "components of one step"
-    cure = "bring both to one step"
-    require(first.step == other.step, "records.files", " and ".join(ends), allowed, cure)
-    is_other = not np.array_equal(first.samples, other.samples)
-    require(is_other, "records.files", f"{first.name} twice", "a file for each component")
-
-
 SPECTRUM = partial(
     section_at, "records.spectrum", "alphacut.frame.spectra.code_spectrum:SuiteTarget"
 )
@@ -444,8 +430,8 @@ class RecordsSection(Section):
         for components in self.suite:
             what = f"{count} and {len(components)} files a record"
             require(len(components) == count, key, what, "as many components of each record")
-            for other in components[1:]:
-                _require_one_ground(components[0], other)
+            with by_keys(lambda _: key):
+                require_one_ground(components)
         allowed = 'beside records of two components, as files = [["x.AT2", "y.AT2"]]'
         require(count > 1 or self.angle == 0, "records.angle", "with one component", allowed)
         is_rotated = self.scale.measure.startswith("RotD")

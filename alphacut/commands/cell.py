@@ -24,7 +24,9 @@ from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, ranks
 from alphacut.io.provenance import versions
 from alphacut.rve.cell.cell import STRAIN
+from alphacut.rve.guaranteed_cuts import guaranteed_constants
 from alphacut.rve.result.engineering_constants import NAMES, engineering_constants
+from alphacut.rve.result.moduli import ISOTROPIC
 from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.rve.series.fibre_constants import fibre_constants
 from alphacut.rve.spheres.result import HomogenisedSpheres, hill_average
@@ -39,7 +41,6 @@ from alphacut.stages.cell import (
     require_bounds,
     require_tolerance,
 )
-from alphacut.stages.mesh_bounds import bounds_of_mesh, guaranteed_constants
 from alphacut.stochastic import ThetaDistribution
 
 
@@ -135,9 +136,9 @@ def bounds_document(problem: CellProblem) -> Document:
     Raises:
         FailedError: The mesh is too coarse for a lower bound.
     """
-    [bounds] = bounds_of_mesh(problem, [None], parallel=ranks() > 1)
+    [bounds] = problem.mesh_bounds([None], parallel=ranks() > 1)
     constants = {}
-    for name, cuts in guaranteed_constants(problem, [bounds]).items():
+    for name, cuts in guaranteed_constants([bounds], problem.average or ISOTROPIC).items():
         key, unit = key_and_unit(name)
         if name == "E":
             key = "E_GPa"

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Self, TypedDict, cast
+from typing import TYPE_CHECKING, Any, Self, TypedDict, cast
 
 from alphacut.base.errors import FailedError, RefusedError, require
 from alphacut.case.cell import CellContent
@@ -27,6 +27,10 @@ from alphacut.rve.result.moduli import AXES
 from alphacut.rve.result.reference_bounds import reference_bounds
 from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.stochastic import FractionMap, RadiusMap, ThetaDistribution, gauss_rule
+
+if TYPE_CHECKING:
+    from alphacut.rve.image.bounds import StiffnessBounds
+    from alphacut.rve.prism.own_mesh import MeshModel
 
 GPA = 1e9
 
@@ -225,6 +229,26 @@ class CellProblem:
         if self.average is None:
             return result
         return result.with_average(self.average)
+
+    def mesh_bounds(
+        self, levels: Sequence[float | None], *, parallel: bool = False
+    ) -> list[StiffnessBounds]:
+        """Return guaranteed bounds of the stiffness of a mesh from a file at α-levels.
+
+        Args:
+            levels: Levels of the phases' moduli; None for the nominal ones.
+            parallel: Whether all MPI ranks work on one cell together.
+
+        Raises:
+            FailedError: The cell is not solved, or the mesh is too coarse for a lower bound.
+            RefusedError: A library is missing, or the mesh is not allowed.
+        """
+        from alphacut.rve.guaranteed_cuts import bounds_between  # takes time to import
+
+        cell = cast("MeshedCell", self.cell)
+        model = cast("MeshModel", self.model(parallel=parallel))
+        law = cast("ThetaDistribution", self.nominal_radius)
+        return bounds_between(model, law, [cell.extreme_phases(level) for level in levels])
 
     def references(self) -> References:
         """Return the particle fraction and the Hashin–Shtrikman bounds of E at the nominal inputs.

@@ -30,9 +30,10 @@ from alphacut.rve.fuzzy_cell import (
     LossCuts,
     fuzzy_stiffness,
 )
+from alphacut.rve.guaranteed_cuts import with_guaranteed_cuts
 from alphacut.rve.result.engineering_constants import NAMES
+from alphacut.rve.result.moduli import ISOTROPIC
 from alphacut.stages.cell import GPA, CellProblem, References, key_and_unit, require_levels
-from alphacut.stages.mesh_bounds import with_guaranteed_cuts
 from alphacut.stages.store import Stage, StageContext, StageResult
 
 if TYPE_CHECKING:
@@ -250,7 +251,8 @@ def compute(problem: CellProblem, context: StageContext) -> StageResult[ModulusR
         identity=identity(problem) if context.samples else None,
     )
     if problem.mesh.bounds:
-        stiffness = with_guaranteed_cuts(problem, stiffness)
+        bounds = problem.mesh_bounds([float(level) for level in stiffness.bounds.alpha])
+        stiffness = with_guaranteed_cuts(stiffness, bounds, problem.average or ISOTROPIC)
     return StageResult(modulus_result(problem, stiffness), stiffness.to_dataset())
 
 

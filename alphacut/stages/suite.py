@@ -7,36 +7,28 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, cast
 
-import numpy as np
-
-from alphacut.base.number_text import engineering
 from alphacut.case.loads import RecordsSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
-from alphacut.frame import Accelerogram, Limit, Peak, ScaledSuite, SuitePeaks, scale_suite
-from alphacut.frame.analyses.angles import turned_components
+from alphacut.frame import Limit, Peak, ScaledSuite, SuitePeaks, scale_suite
 from alphacut.frame.analyses.fragility import increments_of
 from alphacut.frame.analyses.incremental import IncrementalAnalysis, Increments
 from alphacut.frame.analyses.suites import (
     ScaledRecord,
     record_peaks,
+    require_proved,
     scaled_records,
     summarised,
     thresholds_under,
 )
-from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.records.components import corrected_components
 from alphacut.frame.structures.linear import LinearSystem
-from alphacut.frame.structures.quantities import output_of
 from alphacut.frame.threshold import Threshold
-from alphacut.fuzzy.result import Nature
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.store import Stage, StageContext, StageResult
 
 if TYPE_CHECKING:
     from alphacut.frame.spectra.code_spectrum import SuiteTarget
-
-VERTICAL = 2
-"""Index of the vertical component of a record."""
 
 
 def suite_records(
@@ -58,9 +50,10 @@ def suite_records(
             no whole number of steps.
     """
     scaled = scaled_suite(section, structure)
+    corrected = [corrected_components(x, section.baseline) for x in section.suite]
     records = scaled_records(
         structure.model,
-        _corrected(section) if scaled is None else scaled.suite,
+        corrected if scaled is None else scaled.suite,
         duration=envelope.duration,
         step=envelope.step,
         scale=section.scale.value,
@@ -69,7 +62,7 @@ def suite_records(
     )
     # Measures are those of the components as they were recorded.
     if section.angle and not section.has_all_angles:
-        records = tuple(_turned(record, section.angle) for record in records)
+        records = tuple(record.turned(section.angle) for record in records)
     # Each response ends at a time of its own. The case has been checked for the duration of
     # [envelope] alone, which is the longest.
     for record in records:
@@ -92,47 +85,13 @@ def scaled_suite(section: RecordsSection, structure: Structure) -> ScaledSuite |
         return None
     spectrum = cast("SuiteTarget", section.spectrum.made)
     return scale_suite(
-        [ground for (ground,) in _corrected(section)],  # of one component each
+        # of one component each
+        [ground for x in section.suite for ground in corrected_components(x, section.baseline)],
         spectrum.target,
         structure.model,
         fit=spectrum.fit,
         over=spectrum.over,
     )
-
-
-def _corrected(section: RecordsSection) -> list[tuple[Accelerogram, ...]]:
-    """Return the components of the records after their baseline correction.
-
-    The third component of a record is the vertical one. Instruments may stop their channels at
-    different times: components that are shorter than the longest one end in zeros, which is the
-    last of their remarks.
-    """
-    suite = []
-    for components in section.suite:
-        corrected = []
-        for k, recording in enumerate(components):
-            ground = recording.accelerogram(section.baseline, is_vertical=k == VERTICAL)
-            corrected.append(ground)
-        longest = max(len(ground.samples) for ground in corrected)
-        suite.append(tuple(_ended_in_zeros(ground, longest) for ground in corrected))
-    return suite
-
-
-def _ended_in_zeros(ground: Accelerogram, count: int) -> Accelerogram:
-    """Return an accelerogram with as many samples, of which those behind its own are zero."""
-    missing = count - len(ground.samples)
-    if missing == 0:
-        return ground
-    remark = f"ends in {missing} zeros, since it is shorter than another component"
-    samples = np.append(ground.samples, np.zeros(missing))
-    return replace(ground, samples=samples, remarks=(*ground.remarks, remark))
-
-
-def _turned(record: ScaledRecord, angle: float) -> ScaledRecord:
-    """Return a record whose two horizontal components are turned by an angle in rad."""
-    first, second, *vertical = record.components
-    horizontal = turned_components(first, second, angle)
-    return replace(record, components=(*horizontal, *vertical))
 
 
 def linear_model(structure: Structure) -> LinearSystem:
@@ -215,28 +174,8 @@ def _peaks(
         progress=context.tick,
     )
     if task.section.method in ("proof", "dual"):
-        _require_guaranteed(peaks, structure, record)
+        require_proved(peaks, record.name, structure.unit)
     return StageResult(peaks)
-
-
-def _require_guaranteed(
-    peaks: Mapping[str, Peak], structure: Structure, record: ScaledRecord
-) -> None:
-    """Refuse peaks that are not guaranteed, of a case that names a proof as its method.
-
-    Raises:
-        UnprovedError: A peak is not guaranteed. The message has what is known: the peak that a
-            structure is known to reach, and the bound as it is estimated.
-    """
-    for name, peak in peaks.items():
-        if peak.nature is Nature.GUARANTEED:
-            continue
-        unit = structure.unit(output_of(name))
-        reached = engineering(float(peak.reached[0]), unit)
-        estimate = engineering(float(peak.far_end[0]), unit)
-        known = f"a structure reaches {reached}, and at most {estimate} is estimated"
-        what = f"{name} under {record.name} is not proved; {known}"
-        raise UnprovedError(what, peak.cause or "method auto takes estimates")
 
 
 def suite_peaks(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product
 from math import ceil, pi
@@ -19,11 +19,12 @@ from alphacut.base.number_text import (
     range_text,
 )
 from alphacut.base.progress_bar import Progress, nth_subprogress
-from alphacut.frame.analyses.angles import TURN, angle_peaks, angle_response
+from alphacut.frame.analyses.angles import TURN, angle_peaks, angle_response, turned_components
 from alphacut.frame.analyses.answer import Answer, Row
 from alphacut.frame.analyses.limits import Limit, thresholds_of
 from alphacut.frame.analyses.peaks import Peak, Peaks, close_peaks, largest_peaks, with_combined
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.records.history import Accelerogram
@@ -126,6 +127,12 @@ class ScaledRecord:
     def measures(self) -> Mapping[str, float]:
         """Intensity measures by name."""
         return self.facts.measures
+
+    def turned(self, angle: float) -> ScaledRecord:
+        """Return the record with its two horizontal components turned by an angle in rad."""
+        first, second, *vertical = self.components
+        horizontal = turned_components(first, second, angle)
+        return replace(self, components=(*horizontal, *vertical))
 
 
 def scaled_records(
@@ -467,6 +474,29 @@ def _questions(
     return [
         replace(threshold, value=x, answered=float(a)) for x, a in zip(values, levels, strict=True)
     ]
+
+
+def require_proved(peaks: Mapping[str, Peak], record: str, unit_of: Callable[[str], str]) -> None:
+    """Refuse peaks that are not guaranteed, where a proof was named as the method.
+
+    Args:
+        peaks: Peaks under a record by name.
+        record: Name of the record.
+        unit_of: Function that returns the SI unit of an output.
+
+    Raises:
+        UnprovedError: A peak is not guaranteed. The message has what is known: the peak that a
+            structure is known to reach, and the bound as it is estimated.
+    """
+    for name, peak in peaks.items():
+        if peak.nature is Nature.GUARANTEED:
+            continue
+        unit = unit_of(output_of(name))
+        reached = engineering(float(peak.reached[0]), unit)
+        estimate = engineering(float(peak.far_end[0]), unit)
+        known = f"a structure reaches {reached}, and at most {estimate} is estimated"
+        what = f"{name} under {record} is not proved; {known}"
+        raise UnprovedError(what, peak.cause or "method auto takes estimates")
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
