@@ -64,9 +64,11 @@ MAX_ELEMENTS = 8
 # as too wide, and the part of this room that an element may take without a closer look (tuned).
 GIVE_UP = 10.0
 SMALL_VIOLATION = 1e-4
-# Length of an element that begins and ends at fixed times, as a fraction of the largest one (tuned:
-# the polynomial of the load misses little of intervals that are much shorter).
+# Length of an element that begins and ends at fixed times, as a fraction of the largest one, and
+# the same where much may be left out (tuned: the polynomial of the load misses little of intervals
+# that are much shorter).
 STRIDE = 0.25
+LONG_STRIDE = 0.5
 # Numbers of one array up to which elements are treated together (tuned to the processor's caches).
 CHUNK = 400_000
 # How far the slider may be moved by events that are left out if nothing else is known, and by one
@@ -421,7 +423,9 @@ class InterpolatedFrame:
         start = np.concatenate([at.q0, momentum]).T.copy()
         window = WINDOW * 2 * np.pi / slowest
         spectral = np.ascontiguousarray(coefficients(np.eye(n_sets), model.inputs, model.degree).T)
-        stride = max(int(STRIDE * longest / width), 1)
+        # What longer elements miss matters little beside much that may be left out.
+        is_wide = room is not None and float(moved.min()) > least_drift / 2
+        stride = max(int((LONG_STRIDE if is_wide else STRIDE) * longest / width), 1)
         count = march(
             frames, loads, start, last, longest, window, moved, small, stride, spectral, elements
         )

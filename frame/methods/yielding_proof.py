@@ -37,6 +37,9 @@ MAX_INPUTS = 3
 """Most inputs with a width: the number of sub-boxes grows as a power of theirs."""
 ROOM = 0.5
 """Fraction of the wanted gap that may be spent on events that are left out (tuned)."""
+ROOM_TO_LIMIT = 1.5
+"""The same of the distance of peaks from a limit (tuned: in the mean over the box, on whose parts
+it counts, what is left out costs about a third of its largest cost)."""
 ROOM_BEFORE = 0.7
 """Fraction of the distance of what follows below the peak that may be spent so (tuned)."""
 SHOWN_RANGES = 3
@@ -343,7 +346,7 @@ class _Search:
             for column, threshold in left:
                 of_column = to_gap[:, column]
                 if threshold.value is not None:
-                    of_column = ROOM * np.abs(threshold.value - later[:, column])
+                    of_column = ROOM_TO_LIMIT * np.abs(threshold.value - later[:, column])
                 allowed[:, column] = np.minimum(allowed[:, column], of_column)
         # Outputs that stay at rest, on which S has no influence, do not count.
         by_norm = np.where(history.by_norm > 0, history.by_norm, 1e-300)
