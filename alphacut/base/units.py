@@ -17,7 +17,8 @@ from typing import NamedTuple
 
 _PREFIXES = {
     "p": 1e-12, "pico~": 1e-12, "n": 1e-9, "nano~": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6,
-    "micro~": 1e-6, "m": 1e-3, "milli~": 1e-3, "c": 1e-2, "centi~": 1e-2, "d": 0.1, "da": 10.0,
+    "micro~": 1e-6, "mikro~": 1e-6,
+    "m": 1e-3, "milli~": 1e-3, "c": 1e-2, "centi~": 1e-2, "d": 0.1, "da": 10.0,
     "h": 1e2, "k": 1e3, "kilo~": 1e3, "M": 1e6, "mega~": 1e6, "deca~": 10.0, "G": 1e9,
     "giga~": 1e9, "": 1.0,
 }  # fmt: skip
@@ -30,9 +31,15 @@ _VOCABULARY = """
 .3048 m ft foot feet
 1e-10 m Å angstrom angstroms ångström
 1e-6 m micron microns
+1 m м 米
+.01 m см 厘米
+.001 m мм 毫米
+1e-6 m мкм 微米
 2.54e-5 m thou mil mils
 1 s s(n,u,µ,μ,m) second(*) seconds(*) sec(m) secs seg sek segundo segundos seconde secondes
-1 s Sekunde Sekunden
+1 s Sekunde Sekunden с сек 秒
+.001 s мс 毫秒
+1 cycle·s-1 Гц 赫兹
 60 s min minute minutes Minuten
 3600 s h hour hours hr Stunden
 .001 kg g(k,M) gram(k) grams(*) gramme(*) grammes(*) kilo kilos
@@ -40,6 +47,11 @@ _VOCABULARY = """
 907.18474 kg ton tons tonelada toneladas
 .45359237 kg lb lbs lbm pound pounds
 14.593902937206 kg slug slugs
+1 kg·m·s-2 Н 牛 牛顿
+1e3 kg·m·s-2 кН 千牛
+1e6 kg·m·s-2 МН 兆牛
+1 kg кг 千克
+1e3 kg т 吨
 1 kg·m·s-2 N(m,da,k,M,G) newton(*) newtons(*)
 9.80665 kg·m·s-2 kgf kp
 9806.65 kg·m·s-2 tf tonf ton~force tons~force tonne~force tonnes~force
@@ -86,7 +98,8 @@ _VOCABULARY = """
 _SUPERSCRIPTS = str.maketrans("⁻−¹²³⁴", "--1234")
 # Units that are words or other symbols as well: they count where brackets, a number or a word such
 # as "unit" stand beside them.
-_WEAK = "m s g h t n v in us min bar kilo count digit bit degree turn gs ns gravity %".split()  # noqa: SIM905
+_WEAK = {*"msghtnv%мстн", "in", "us", "min", "bar", "kilo", "count", "digit", "bit", "degree"}
+_WEAK |= {"turn", "gs", "ns", "gravity"}
 NUMBER = r"(?:\d+\.?\d*(?:[eEdD][-+]?\d+)?|\.\d+(?:[eEdD][-+]?\d+)?)"
 _DECIMAL = rf"(?:1\s*/\s*\d{{2,5}}|\d+,\d+|{NUMBER})(?![\d.])"
 _MARK = r"\s*(?:[x×*;,/\s]|\bby\b)\s*"
@@ -96,7 +109,7 @@ _BEFORE = re.compile(
     rf"|[\"']value[\"']\s*:\s*({NUMBER})\s*,\s*[\"']units?[\"']\s*:\s*[\"']$"
 )
 _BEHIND = re.compile(
-    rf"\s*[\])\"'}}]*(?:\s*(?:[:=,]+|\.{{2,}}|\bis\b)\s*|\s+)[\[(\"']*({_THREE}|{_DECIMAL})(?![\w/:-])(?!\.\d)"
+    rf"\s*[\])\"'}}]*(?:\s*(?:[:=,]+|\.{{2,}}|\bis\b)\s*|\s+)[\[(\"'/]*({_THREE}|{_DECIMAL})(?![\w/:-])(?!\.\d)"
 )
 _LABEL = r"\b(?:acc\w*|ag?|times?|t|d[_\s]?t|f|freq\w*|disp\w*|vel\w*|[duvx]|interval|step|y\w*"
 _LABEL += r"|mass\w*|stiff\w*|damp\w*|forces?|lengths?)"
@@ -125,6 +138,12 @@ _QUANTITIES = {
 }
 
 
+# A number in words before a unit, as "thousandths of an inch".
+_PARTS = (
+    r"(?i)(?:tenth|hundredth|thousandth|millionth|mil[eé]sima|d[eé]cima|cent[eé]sima|tausendstel"
+    r"|zehntel|hundertstel|milli[eè]me|hundred|thousand|million|milli)\w*\s+"
+    r"(?:of\s+(?:an?\s+)?|de\s+)?$"
+)
 TRANSFORMED = (
     r"\b(?:normali[sz]ed|normali[sz]ation|non-?dimensional\w*|dimensionless|scaled\s+by|divided|squared?|roots?"
     r"|log(?:10|arithm\w*)?|invers\w+|inverted|doubled|halved|twice|reciprocal\w*|tenths?|hundredths?|thousandths?"
@@ -236,18 +255,18 @@ def _plain_words() -> dict[str, Word | None]:
 @lru_cache(maxsize=1)
 def _patterns() -> tuple[re.Pattern[str], re.Pattern[str]]:
     """Return the patterns of a unit, and of one of its atoms behind the mark that joins it."""
-    names = (re.escape(name).replace("\\~", "~").replace("~", r"[-\s]*") for name in _words())
+    names = (re.escape(name).replace("\\~", "~").replace("~", r"[-\s_]*") for name in _words())
     name = "|".join(sorted(names, key=len, reverse=True))
     power = (
         r"(?:\s*(?:\^|\*\*)\s*(?:[({]\s*(-?\d)\s*[)}]|(-?\d))|\{?(-?[1-4])\}?(?!\w|\.\d)"
         r"|\s+(squared|cubed)(?![a-z]))?"
     )
     # Names that end with a digit, as mps2, end where the digits do.
-    ended = r"(?![a-zµμäöüß])(?!(?<=\d)\d)"
+    ended = r"(?![^\W\d_])(?!(?<=\d)\d)"
     atom = rf"(?:(square|sq\.?|cubic|cu\.?)\s+)?({name}){ended}{power}"
     # A blank joins a negative power, and what follows a force: "cm s-2" and "kN s/m".
     mark = (
-        r"(\s*/\s*\(?|\s*\b(?:per|pro|par|por)\s+|_p?(?=s\^?2)|\s*[*·×]\s*|[-.](?=[a-z])"
+        r"(\s*/\s*\(?|[\s_]*(?<![a-z])(?:per|pro|par|por)[\s_]+|_p?(?=s\^?2)|\s*[*·×]\s*|[-.](?=[a-z])"
         rf"|\s+(?=(?:{name})\s*(?:\^|\*\*)?\s*[({{]?-)|(?-i:(?<=[Nf])\s+(?=[cm]?m\b|s\b)))"
     )
     whole = re.sub(r"\((?=[^?])", "(?:", f"{atom}(?:{mark}{atom})*")
@@ -273,7 +292,7 @@ def _parsed(text: str, start: int) -> _Parsed | None:
     outer = 1  # −1 within a bracket behind "/"
     while end < match.end() and (one := part.match(text, end)):
         mark, shape, name, bracketed, power, glued, spelled = one.groups()
-        name = re.sub(r"[-\s]", "", name)
+        name = re.sub(r"[-\s_]", "", name)
         if word_of(name) is None:
             break
         is_quotient = re.search("(?i)/|p[aeor]+|_", mark or "") is not None
@@ -364,6 +383,8 @@ def mentions(text: str) -> list[Mention]:
             numbers = tuple(_numbers(next(filter(None, which.groups()))))
         elif unit.dimension and re.search(r"\d\.?\s*$", plain[last_end:start]):
             numbers = (math.nan,)  # of a range, as "0.1-25 Hz", or a power of ten
+        if re.search(_PARTS, plain[last_end:start]):
+            numbers = (math.nan,)
         begin = number.start() if number else start
         stop = behind.end() if behind else end
         before, rest = plain[last_end:begin], plain[stop:next_start]

@@ -80,7 +80,14 @@ def _array(file: str, info: ValidationInfo) -> Array:
     unknowns = info.data.get("unknowns", ())
     rows = len(unknowns) or MAX_ROWS
     override = info.data.get("override", [])
-    array = read_matrix(path, name=member, max_rows=rows, unknowns=unknowns, override=override)
+    array = read_matrix(
+        path,
+        name=member,
+        max_rows=rows,
+        unknowns=unknowns,
+        override=override,
+        quantity=info.field_name or "",
+    )
     if unknowns:
         names = unknowns
         held: tuple[str, ...] = ()

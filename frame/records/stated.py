@@ -29,14 +29,14 @@ _SENSOR = (
 _SITE = r"(?i)altitude|height|elevation|depth|coordinate|vs_?30|\bwave|peak|pg[vd]|distance"
 FACTOR = (
     r"(?:[x×*·]\s*|\b)10\s*(?:\^|\*\*|⁻|[²³⁴⁵⁶])|[x×*·]\s*10\s*[-−]\s*\d|\b1\.?0*e[-+]?\d"
-    r"|[x×*·]\s*(?:1000*\b|0?\.\d)"
+    r"|(?<![a-z_])[x×*·]\s*(?:1000*\b|0?\.\d)"
     r"|\b(?:scal\w*[\s_]*factor|scal\w*(?=\s*[:=])|multipl\w*|divided|conversion)[\s:=]*(?:(?:by|with)\s+)?"
     r"(?!1(?:\.0*)?\b)[\d.]|\btimes\s+(?:\d|t\w+)|\bfactor\s*(?:of\s+)?[:=]?\s*(?!1\b)\d|(?<=[a-z])\s*/\s*10+\b"
 )
 # Words of times between samples, in some languages, and words of other times and frequencies.
 _SAMPLING = (
     r"(?i)samp|digiti|abtast|[ée]chant|muestre|campion|amostr|step|interval|spac(?:ed|ing)|increment"
-    r"|every|schritt|paso|\bpas\b|passo|\brate|acquisition|(?<![a-z])d(?:elta)?[\s_-]*t(?![a-z])|Δ|\bdelta|@"
+    r"|every|schritt|шаг|paso|\bpas\b|passo|\brate|acquisition|(?<![a-z])d(?:elta)?[\s_-]*t(?![a-z])|Δ|\bdelta|@"
     r"|(?<![a-z])[ft]s\b"
 )
 _OTHER_TIMES = (
@@ -49,7 +49,7 @@ _BEHIND = r"[\s_]*(?:[\s:=@\"',]|\.{2,})*(?:(?:is|was|of|at|with|by)\s+)?"
 _NUMBER = r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?)(?![\d.]*\w)"
 _BARE_STEP = re.compile(
     r"(?:\b(?:sampl\w*|time|data|digiti[sz]\w*)[\s_-]*(?:interval|step|period|spacing|increment)s?"
-    r"|(?:interval|step|increment)s?|(?<![a-z])(?:d(?:elta)?[\s_-]*t|ts)|Δt|\bdelta)"
+    r"|(?:interval|step|increment)s?|(?<![a-z])(?:d(?:elta)?[\s_-]*t|ts)|Δt|\bdelta(?:_?x)?)"
     rf"{_BEHIND}{_NUMBER}",
     re.IGNORECASE,
 )
@@ -124,7 +124,9 @@ class TextStatements:
                 units.pop()
         is_peak = re.search(_PEAK, text) is not None
         for one in units:
-            if one.dimension == ACCELERATION:
+            if "count-1" in one.dimension:  # of a sensor, as "0.06 mg/LSB"
+                self.quantities.append((f"a number of counts of {one.shown}", row))
+            elif one.dimension == ACCELERATION:
                 self._add_unit(one, row, place, is_peak=is_peak)
             elif one.dimension == "s" and not one.numbers:
                 of_times = r"(?i)\b(?:time|abscissa)s?\W*(?:in\s+)?$|\b(?:t|in|units?)\W*$"
@@ -224,8 +226,8 @@ def named_quantity(text: str) -> str:
     if re.search(r"(?:\b|_)(?:a|acc(?:el(?:s|eration\w*)?)?|ag)(?:\b|_)", text, re.IGNORECASE):
         return ""
     words_of_quantities = {
-        "a displacement": r"disp(?:l\w*)?|displacements?|deflection|drift",
-        "a velocity": r"vel(?:oc\w*)?|speed",
+        "a displacement": r"disp(?:l\w*)?|d[ée]placements?|desplaz\w+|deflection|drift",
+        "a velocity": r"vel(?:oc\w*)?|speed|vitesses?|geschwindigkeit|скорост\w",
         "a spectrum": r"p?sa",
         "a force": r"forces?|loads?|thrust|(?:base )?shear",
         "a strain": r"strains?",

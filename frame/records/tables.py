@@ -65,11 +65,11 @@ class _Column:
         if match := re.fullmatch(r"(.*?)[\s,]*[\[(]\s*([^\])]*?)\s*[\])]?", text):
             return cls(match[1].lower(), match[2])
         text = re.sub(r"(?i)^(t|time|a|acc\w*)/", r"\1 ", text)
-        match = re.fullmatch(r"(.*?)[\s,_]+(\S+?)", text)
-        # Without brackets the last word is a unit only if it is known: "ground acceleration" has
-        # none.
-        if match and factor_of(match[2], ACCELERATION, FORCE, "s"):
-            return cls(match[1].lower(), match[2])
+        # Without brackets the last words are a unit only if they are known and whole, as in
+        # "accel_milli_g": "ground acceleration" has none.
+        for match in re.finditer(r"[\s,_]+(?=[^\W\d]|[%‰])", text):
+            if factor_of(text[match.end() :], ACCELERATION, FORCE, "s"):
+                return cls(text[: match.start()].lower(), text[match.end() :])
         return cls(text.lower())
 
     @property

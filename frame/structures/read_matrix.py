@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from io import StringIO
 from itertools import compress
 from pathlib import Path
@@ -45,6 +45,12 @@ ALLOWED = "a file .mtx, .sti, .mas, .pch, .op4, .full, .npz, .npy or .csv of fin
 MAX_ROWS = 5000
 # Abaqus writes 1e36 or more on the diagonal of an unknown that it holds. No spring comes near it.
 HELD_STIFFNESS = 1e35
+# Quantities by the dimensions of units; those of forces are of all.
+_QUANTITIES = {
+    "kg": "mass", "kg m2": "mass", "kg m": "mass", "kg s-2": "stiffness", "kg m2 s-2": "stiffness",
+    "kg m2 rad-1 s-2": "stiffness", "kg s-1": "damping", "kg m2 s-1": "damping",
+    "kg m2 rad-1 s-1": "damping", "kg m s-1": "damping",
+}  # fmt: skip
 # What stands before the unit of all entries, where that has a number.
 _IN_UNITS = r"(?i)\b(?:in|units?(?:\s+of)?)\W*$|[\[(]\s*$|^\W*$"
 # Words of numbers that are no entries in units of SI, whatever units stand beside them.
@@ -61,6 +67,7 @@ def read_matrix(
     max_rows: int = MAX_ROWS,
     unknowns: Sequence[str] = (),
     override: Sequence[str] = (),
+    quantity: str = "",
 ) -> Array:
     """Read a matrix, as of masses or stiffnesses, from a file; a sparse one becomes dense.
 
@@ -77,6 +84,7 @@ def read_matrix(
             the file does not have are rows of zeros, as of unknowns without mass. A file without
             names is returned as it is.
         override: ``["unit"]`` where a comment in the file states a wrong unit of its numbers.
+        quantity: "mass", "stiffness" or "damping", where the unit in the file must be that of it.
 
     Returns:
         The matrix, shape (n, m); or a vector, shape (n,), where the file has one. Its numbers are
@@ -95,7 +103,7 @@ def read_matrix(
     file = path_of("path", path)
     array, names = _read_named(file, name, max_rows=max_rows)
     warn_of_overrides(file.name, override)
-    factor = 1.0 if override else _stated_factor(file)
+    factor = 1.0 if override else _stated_factor(file, name, quantity)
     if names and unknowns:
         array = _arranged(file.name, array, names, unknowns)
     shape = " × ".join(str(n) for n in array.shape)
@@ -117,34 +125,53 @@ def read_matrix(
     return factor * np.array(array, float)
 
 
-def _stated_factor(path: Path) -> float:
-    """Return the factor to SI of the numbers of a matrix, by the units in comments of its file.
+def _texts_in(path: Path, member: str) -> Iterator[tuple[str, str]]:
+    """Yield what may state a unit, with its place: comments, names, and texts beside arrays."""
+    yield path.stem.replace("_", " "), "in its name"
+    suffix = path.suffix.lower()
+    if suffix == ".npz":
+        for name in names_in_npz(path):
+            if member in ("", name):
+                yield name.replace("_", " "), "in the name of its array"
+            if "unit" in name.lower():
+                yield f"unit {read_npz(path, name, kinds='SU')}", f"array {name}"
+    if suffix not in (".mtx", ".csv", ".pch", ".bdf", ".nas", ".sti", ".mas"):
+        return
+    content = path.read_bytes()
+    for comment in re.finditer(rb"(?m)(?:^[ \t]*(?:%(?!%MatrixM)|\$|\*\*|//)|#).*$", content):
+        row = content.count(b"\n", 0, comment.start()) + 1
+        yield decoded(comment[0]).lstrip(" \t%#$*/"), f"line {row}"
+
+
+def _stated_factor(path: Path, member: str, quantity: str) -> float:
+    """Return the factor to SI of the numbers of a matrix, by the units that its file states.
 
     In a system of units with m and s the numbers of stiffnesses, dampings and masses differ from
     those in SI by the factor of its force: of kN (with t) 1e3, of MN 1e6. Other lengths change
     those of rotations and of displacements differently.
 
     Raises:
-        RefusedError: A comment states other units, or two of different factors; or a value beside
-            a unit that may be that of the numbers.
+        RefusedError: It states other units, two of different factors, or the unit of another
+            quantity than the one asked for; or a value beside a unit that may be that of the
+            numbers.
     """
-    if path.suffix.lower() not in (".mtx", ".csv", ".pch", ".bdf", ".nas", ".sti", ".mas"):
-        return 1.0
     stated = []
+    kinds = {".sti": {"stiffness"}, ".mas": {"mass"}}.get(path.suffix.lower(), set())
     unsure = []
     cure = "write the matrix in N, m, kg, or say override = ['unit'] if the comment is wrong"
-    content = path.read_bytes()
-    for comment in re.finditer(rb"(?m)(?:^[ \t]*(?:%(?!%MatrixM)|\$|\*\*|//)|#).*$", content):
-        line = decoded(comment[0]).lstrip(" \t%#$*/")
-        row = content.count(b"\n", 0, comment.start()) + 1
-        place = f"{path.name}, line {row}"
-        units = mentions(line)
+    for line, where_it_stands in _texts_in(path, member):
+        place = f"{path.name}, {where_it_stands}"
+        is_name = "name" in where_it_stands
+        units = [one for one in mentions(line) if not is_name or (one.is_sure and not one.numbers)]
         rest = without_units(line, units)
         # "mass = weight / g" is a mass.
-        other = None if re.search(r"(?i)\bmass\w*\s*=", line) else re.search(_OTHER_NUMBERS, rest)
+        is_other = re.search(_OTHER_NUMBERS, rest) and not re.search(r"(?i)\bmass\w*\s*=", line)
+        # Of a unit in a script that is not known nothing would be seen.
+        is_other = is_other or (not units and re.search("[\u0370-\uffff]{2}", rest))
         is_per_cent = any(x.dimension == "" and x.is_sure and not x.numbers for x in units)
         allowed = "entries of stiffness, damping or mass in units"
-        require(other is None and not is_per_cent, place, line.strip()[:60], allowed, cure)
+        is_other = is_other or is_per_cent
+        require(is_name or not is_other, place, line.strip()[:60], allowed, cure)
         units = [x for x in units if x.dimension and not (x.numbers and _is_value_of_another(x))]
         is_of_numbers = (
             any(x.is_sure for x in units)
@@ -162,8 +189,13 @@ def _stated_factor(path: Path) -> float:
             require(factor != 0 or not one.is_sure, place, f"in {one.shown}", allowed, cure)
             if factor:
                 where = unsure if one.is_multiple or not one.is_sure else stated
-                where.append(Stated(factor, one.shown, f"line {row}"))
+                where.append(Stated(factor, one.shown, where_it_stands))
+                kinds |= {_QUANTITIES.get(one.dimension, "")} if where is stated else set()
     found = settled(path.name, "unit", stated)
+    # A unit of forces is one of a system of units.
+    is_asked = not quantity or not kinds or bool(kinds & {"", quantity})
+    what = f"of {' and '.join(sorted(kinds))}, by {found or 'its ending'}"
+    require(is_asked, path.name, what, f"of {quantity}", "name the file of that quantity")
     taken = found or Stated(1.0, "of SI")
     for one in unsure:
         settled(path.name, "unit", [one], taken)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Sequence
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,7 @@ from alphacut.base.pictures import opened_picture
 from alphacut.base.stated import warn_of_overrides
 from alphacut.rve.image.memory import require_memory
 from alphacut.rve.image.raw import HEADS, data_of_head, read_head
+from alphacut.rve.image.spacing import require_spacing
 from alphacut.rve.image.stack import read_stack
 from alphacut.rve.image.white import PHOTOMETRIC, as_shown, stored_values, tags_of
 
@@ -60,13 +62,15 @@ def read_grid(path: Path, sides: Sequence[float], override: Collection[str] = ()
         allowed_file = "a volume"
         allowed_shape = "numbers along three axes (z, y, x), 2 × 2 × 2 or more"
         cures = {2: "a picture takes cell.pixel in place of cell.voxel"}
+    texts = [path.stem.replace("_", " ")]
+    require_spacing(path.name, [nan] * dimension, sides, texts=texts, override=override)
     try:
         if path.suffix.lower() == ".npy":
             # The file is mapped, not read: one too large for memory must come as far as the
             # question of how large it is.
             values = np.asarray(read_npy(path, kinds="buifc"))
         elif dimension == 2:
-            values = _read_picture(path, has_square_pixels=sides[0] == sides[1])
+            values = _read_picture(path, sides, override)
         else:
             values = _read_volume(path, sides, override)
     except RefusedError:
@@ -108,7 +112,7 @@ def _read_volume(path: Path, sides: Sequence[float], override: Collection[str]) 
         Exception: What readers raise of damaged files, of many kinds.
     """
     if path.is_dir():
-        return _read_slices(path, has_square_pixels=sides[-1] == sides[-2])
+        return _read_slices(path, sides[-2:], override)
     ending = path.suffix.lower()
     if ending in (".tif", ".tiff"):
         return read_stack(path, sides, override)
@@ -123,14 +127,14 @@ def _read_volume(path: Path, sides: Sequence[float], override: Collection[str]) 
     raise RefusedError(path.name, f"a file of kind {path.suffix or 'unknown'}", allowed, cure)
 
 
-def _read_slices(folder: Path, *, has_square_pixels: bool) -> Array:
+def _read_slices(folder: Path, sides: Sequence[float], override: Collection[str]) -> Array:
     """Return the pictures of a folder as a volume, in the order of the numbers in their names.
 
     Args:
         folder: Folder whose .tif, .tiff, .png and .bmp files are the slices along z; others in it
             are ignored.
-        has_square_pixels: Whether voxels are as long along y as along x; a picture may then not
-            state other pixels.
+        sides: Sides of a pixel along (y, x), in m.
+        override: "voxel", where pictures state wrong ones.
 
     Returns:
         Numbers in the type of the pictures, shape (slices, rows, columns), the top row first.
@@ -152,12 +156,12 @@ def _read_slices(folder: Path, *, has_square_pixels: bool) -> Array:
     missing = [k for k in range(lowest, lowest + count) if k not in by_number]
     what = f"{count} pictures, none with number {min(missing, default=lowest)}"
     require(not missing, folder.name, what, "slices with numbers that follow one another")
-    first = _read_picture(by_number[lowest], has_square_pixels=has_square_pixels)
+    first = _read_picture(by_number[lowest], sides, override)
     shape = (count, *first.shape)
     require_memory(shape)
     values = np.empty(shape, first.dtype)
     for number, file in by_number.items():
-        page = _read_picture(file, has_square_pixels=has_square_pixels)
+        page = _read_picture(file, sides, override)
         is_alike = page.shape == first.shape and page.dtype == first.dtype
         what = f"{page.dtype} of shape {page.shape}"
         require(is_alike, file.name, what, f"{first.dtype} of shape {first.shape} as the others")
@@ -191,12 +195,14 @@ def _numbers_in_names(files: Sequence[Path]) -> list[int]:
     return [int(found[place]) for found in numbers]
 
 
-def _read_picture(path: Path, *, has_square_pixels: bool) -> Array:
+def _read_picture(path: Path, sides: Sequence[float], override: Collection[str]) -> Array:
     """Return the grey values of an image file, bright large, shape (rows, columns), top row first.
 
     Args:
         path: File that Pillow reads.
-        has_square_pixels: Whether the case says that pixels are square, to within 1 %.
+        sides: Sides of a pixel along (y, x), in m. If they are equal, the picture may not state
+            unequal ones.
+        override: "voxel", where the picture states wrong ones.
 
     Raises:
         RefusedError: The file has several pages, or colours that are not grey, or states other
@@ -218,10 +224,12 @@ def _read_picture(path: Path, *, has_square_pixels: bool) -> Array:
             dpi_x, dpi_y = map(float, picture.info.get("dpi", (1, 1)))
         except ZeroDivisionError:  # a fraction over 0 in a TIFF: the pixels are not stated
             dpi_x = dpi_y = 1.0
-        is_as_stated = not has_square_pixels or abs(dpi_x - dpi_y) <= 0.01 * dpi_y
+        is_as_stated = sides[0] != sides[1] or abs(dpi_x - dpi_y) <= 0.01 * dpi_y
         what = f"of pixels {dpi_x:g} by {dpi_y:g} per inch"
         cure = "give cell.pixel = [width, height]"
         require(is_as_stated, path.name, what, "square ones", cure)
+        texts = [text for text in picture.info.values() if isinstance(text, str)]
+        require_spacing(path.name, [nan, nan], sides, texts=texts, override=override)
         require_memory((picture.height, picture.width))
         if is_colour:
             return _grey_of_colours(path.name, np.asarray(picture.convert("RGBA")))

@@ -87,11 +87,13 @@ def require_spacing(
     for one in found:
         # Beside the distance of slices the side of a voxel is that within a slice.
         axes = one.axes[:2] if has_depth and len(one.axes) == 3 else one.axes
+        if len(axes) == 3 and len({stated[k] for k in known}) > 1:
+            axes = (min(known, key=stated.__getitem__),)  # the side to which the ratios belong
         for axis in axes:
             if axis < len(expected):
                 said = Stated(expected[axis], f"of {expected[axis]:g} m along {'xyz'[axis]}")
                 settled(name, "voxel", [one.stated], said, tolerance=0.01)
-            elif axis == VOLUME:
+            elif axis == VOLUME == len(expected):
                 said = Stated(math.prod(expected), f"of {math.prod(expected):g} m^3")
                 settled(name, "voxel", [one.stated], said, tolerance=0.03)
     if not unsure or known or len(unsure) < len(found):

@@ -180,6 +180,10 @@ def _spacing(file: TiffFile) -> tuple[list[float], list[str]]:
         return ome_spacing(file.ome_metadata)
     x = _pixel_side(file, "XResolution")
     y = _pixel_side(file, "YResolution")
+    entry = file.pages.first.tags.get("ResolutionUnit")
+    # Per centimetre (3) is written on purpose; per inch is what programs write for printers.
+    if entry is not None and int(entry.value) == 3 and not file.imagej_metadata:
+        return [x, y, math.nan], ["cm", "cm", ""]
     head = file.imagej_metadata or {}
     unit = str(head.get("unit", "")).replace("\\u00B5", "µ")
     is_pixel = unit.lower() in ("", "pixel", "pixels", "null")

@@ -284,3 +284,34 @@ def test_units_in_comments_are_turned_to_si_or_refused(tmp_path, name, comment, 
             assert read_matrix(path, override=["unit"]).tolist() == matrix
     else:
         assert read_matrix(path) == pytest.approx(factor * np.array(matrix))
+
+
+def test_units_in_names_count_and_tell_the_quantity(tmp_path):
+    matrix = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    np.save(tmp_path / "K_kN_per_m.npy", matrix)
+    np.savez(tmp_path / "m.npz", M_tonne=matrix)
+    np.savez(tmp_path / "n.npz", k=matrix, unit="MN/m")
+    (tmp_path / "k.csv").write_text("# damping, kN s/m\n2,-1\n-1,2\n")
+    (tmp_path / "s.csv").write_text("# units: kN, m\n2,-1\n-1,2\n")
+    cases = {
+        "K_kN_per_m.npy": (1e3, {"stiffness"}),
+        "m.npz": (1e3, {"mass"}),
+        "n.npz": (1e6, {"stiffness"}),
+        "k.csv": (1e3, {"damping"}),
+        "s.csv": (1e3, {"mass", "stiffness", "damping"}),
+    }
+    for name, (factor, quantities) in cases.items():
+        member = "k" if name == "n.npz" else ""
+        for quantity in ("mass", "stiffness", "damping"):
+            if quantity in quantities:
+                array = read_matrix(tmp_path / name, name=member, quantity=quantity)
+                assert array == pytest.approx(factor * matrix)
+            else:
+                with refuses(name):
+                    read_matrix(tmp_path / name, name=member, quantity=quantity)
+
+
+def test_a_unit_in_a_script_that_is_not_known_is_refused(tmp_path):
+    (tmp_path / "k.csv").write_text("# 킬로뉴턴\n2,-1\n-1,2\n", encoding="utf-8")
+    with refuses("k.csv, line 1"):
+        read_matrix(tmp_path / "k.csv")

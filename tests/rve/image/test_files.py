@@ -9,6 +9,7 @@ import zlib
 import numpy as np
 import pytest
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from alphacut.fuzzy import RefusedError
 from alphacut.rve import read_image
@@ -546,3 +547,20 @@ def test_an_order_of_bytes_that_nrrd_does_not_state_is_asked_for(tmp_path, rng):
         voxels_of(tmp_path / "a.nrrd")
     (tmp_path / "a.nrrd").write_bytes(head.encode() + b"endian: big\n\n" + values.tobytes())
     assert np.array_equal(voxels_of(tmp_path / "a.nrrd"), values)
+
+
+def test_names_texts_and_resolutions_of_pictures_state_sides(tmp_path, rng):
+    values = rng.integers(0, 250, SHAPE).astype("u1")
+    np.save(tmp_path / "scan_2.5um.npy", values)
+    options = {"metadata": {"axes": "ZYX"}, "photometric": "minisblack"}
+    stack(tmp_path / "a.tif", values, resolution=(4000, 4000), resolutionunit=3, **options)
+    (tmp_path / "slices").mkdir()
+    for k, page in enumerate(values):
+        head = PngInfo()
+        head.add_text("Comment", "Voxelgroesse 2,5 Mikrometer")
+        Image.fromarray(page).save(tmp_path / "slices" / f"{k}.png", pnginfo=head)
+    for name in ("scan_2.5um.npy", "a.tif", "slices"):
+        side = 2.5e-6
+        assert np.array_equal(voxels_of(tmp_path / name, (side, side, side)), values)
+        with pytest.raises(RefusedError):
+            voxels_of(tmp_path / name, (side, 3 * side, side))
