@@ -27,19 +27,10 @@ from alphacut.report.page import comparison_page, render_page
 from alphacut.report.results import (
     compared,
     comparison,
-    fractions_text,
-    guaranteed_of,
-    material,
-    mesh_words,
     run_text,
-    width_text,
 )
-from alphacut.rve.result.engineering_constants import PLANE_STRAIN
-from alphacut.stages.cell import isotropic_label
 from alphacut.stages.identify import identify_inputs
-from alphacut.stages.image import ImageResult
 from alphacut.stages.microstructure import fragment
-from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.summary import SUMMARY, Parts, Results, Summary
 
 
@@ -213,33 +204,12 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
     with open_results(options) as (case, store):
         results = Results(case.content)
         Pipeline(results, store, options.petsc, device=options.device).compute_modulus()
-    if results.image is not None:
-        image = results.image.numbers
-        part: ModulusResult | ImageResult = image
-        constants = material(Parts(image=image), every_constant=True)
-        lines = [fractions_text(image), guaranteed_of(image), width_text(image)]
-    else:
-        assert results.modulus is not None
-        part = cell = results.modulus.numbers
-        constants = material(Parts(modulus=cell), every_constant=True)
-        cost = f"{cell.samples} samples, {cell.solves} linear systems, {cell.seconds:.1f} s"
-        lines = []
-        # Constants without stress along the fibres need the stiffness along them, which follows
-        # from that of the plane for isotropic phases alone.
-        if list(cell.plane) == [PLANE_STRAIN]:
-            why = "the other definition is for one particle of two isotropic phases"
-            lines.append(f"Plane strain alone: {why}")
-        if cell.particles == "mesh":
-            lines.append(mesh_words(cell.nature))
-        lines.append(f"{cost}, {cell.method}")
-        if cell.solver:
-            lines.append(cell.solver)
-    if bounds := part.references.get("hashin_shtrikman_E_GPa"):
-        lower, upper = bounds
-        lines.insert(0, f"{isotropic_label(part.average)}: {lower:.4f} … {upper:.4f} GPa")
+    parts = Parts.of(results)
+    part = parts.image or parts.modulus
+    assert part is not None
     cuts = tables.shown(tables.modulus(part))
-    text = text_table(cuts.head, cuts.rows) + text_table(constants.head, constants.rows)
-    write_answer(options, to_document(part), out, text + "".join(f"{line}\n" for line in lines))
+    text = text_table(cuts.head, cuts.rows) + run_text(parts, every_constant=True)
+    write_answer(options, to_document(part), out, text)
     return 0
 
 

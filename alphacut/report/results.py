@@ -34,7 +34,8 @@ from alphacut.frame.analyses.answer import Record, enclosing_box_words
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Ends, Nature, rounded
 from alphacut.rve.image.bounds import is_positive_definite
-from alphacut.stages.cell import BOTH_BOUNDS, UPPER_BOUND, constant_label
+from alphacut.rve.result.engineering_constants import PLANE_STRAIN
+from alphacut.stages.cell import BOTH_BOUNDS, UPPER_BOUND, constant_label, isotropic_label
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult, infinite_if_unknown
@@ -73,24 +74,22 @@ class ComparedEntry(NamedTuple):
     value: float | str
 
 
-def run_text(parts: Parts) -> str:
+def run_text(parts: Parts, *, every_constant: bool = False) -> str:
     """Return the results of a run for the console.
 
     Args:
         parts: Numbers of the results; stages that the run lacks are left out.
+        every_constant: Whether all constants of a cell or an image are shown.
 
     Returns:
         Lines that end with a newline: what α-cuts mean; the tables of the material, of the peaks
         and of identified inputs; and sentences on guarantees, smaller time steps, the answers to
         questions, and the inputs that matter most, wrapped at 80 letters.
     """
-    shown = [table for table in (material(parts), peak_table(parts)) if table.rows]
-    sentences: list[str] = []
-    if parts.image is not None:
-        sentences.append(guaranteed_of(parts.image))
+    of_material = material(parts, every_constant=every_constant)
+    shown = [table for table in (of_material, peak_table(parts)) if table.rows]
+    sentences = list(material_sentences(parts))
     sentences.extend(chain(natures(parts), wide_bounds(parts), smaller_steps(parts)))
-    if parts.modulus is not None and parts.modulus.solver:
-        sentences.append(f"Cells: {parts.modulus.solver}")
     if parts.update is not None and parts.update.is_refuted:
         sentences.append(parts.update.refuted)
     elif parts.update is not None:
@@ -288,28 +287,37 @@ def mesh_words(nature: Nature) -> str:
     return BOTH_BOUNDS if nature is Nature.GUARANTEED else UPPER_BOUND
 
 
-def guaranteed_of(image: ImageResult) -> str:
-    """Return a sentence, without its full stop, on what the bounds of an image hold for."""
+def material_sentences(parts: Parts) -> Iterator[str]:
+    """Yield sentences, without full stops, on how the material was computed, and what it is of."""
+    if (image := parts.image) is not None:
+        yield from image_sentences(image)
+    if (cell := parts.modulus) is not None:
+        # Constants without stress along the fibres need the stiffness along them, which follows
+        # from that of the plane for isotropic phases alone.
+        if list(cell.plane) == [PLANE_STRAIN]:
+            yield "Plane strain alone: the other definition is for one particle of isotropic phases"
+        cost = f"{cell.samples} samples, {cell.solves} linear systems, {cell.seconds:.1f} s"
+        yield f"Cells: {cost}, {cell.method}"
+        if cell.solver:
+            yield f"Cells: {cell.solver}"
+    for part in (cell, image):
+        if part is not None and (bounds := part.references.get("hashin_shtrikman_E_GPa")):
+            yield f"{isotropic_label(part.average)}: {bounds[0]:.4f} … {bounds[1]:.4f} GPa"
+
+
+def image_sentences(image: ImageResult) -> Iterator[str]:
+    """Yield sentences, without full stops, on what bounds of an image hold for, and its phases."""
     # Segmentation is not part of the claim: a wrong threshold gives right bounds of a wrong image.
-    if _is_plane(image):
+    # The stiffness matrix is 3×3 of an image, and 6×6 of a volume.
+    kind = "volume"
+    what = "volume, repeated periodically"
+    if len(image.lower_GPa) == 3:
+        kind = "area"
         what = "image as segmented, repeated periodically, in plane strain"
-    else:
-        what = "volume, repeated periodically"
-    return f"The bounds are guaranteed of the {what}"
-
-
-def _is_plane(image: ImageResult) -> bool:
-    """Return whether the stiffness matrix is 3×3, of an image, and not 6×6, of a volume."""
-    return len(image.lower_GPa) == 3
-
-
-def fractions_text(image: ImageResult) -> str:
-    """Return a sentence, without its full stop, on the fractions of the phases."""
-    measured = "volume"
-    if _is_plane(image):
-        measured = "area"
+    yield f"The bounds are guaranteed of the {what}"
     fractions = ", ".join(f"{name} {fraction:.1%}" for name, fraction in image.fractions.items())
-    return f"Of the {measured}: {fractions}"
+    yield f"Of the {kind}: {fractions}"
+    yield width_text(image)
 
 
 def width_text(image: ImageResult) -> str:
