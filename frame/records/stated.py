@@ -15,6 +15,7 @@ from alphacut.base.units import (
     FREQUENCY,
     TRANSFORMED,
     Mention,
+    factor_of,
     mentions,
     without_units,
 )
@@ -138,7 +139,7 @@ class TextStatements:
                 self._add_other(one, row, text)
         for pattern, unit in _SYSTEMS.items():
             if re.search(pattern, text, re.IGNORECASE):
-                self.units.append(Stated({"cm/s^2": 0.01}.get(unit, 1.0), unit, place))
+                self.units.append(Stated(factor_of(unit, ACCELERATION), unit, place))
         lengths = [x for x in all_units if x.dimension == "m" and not x.numbers]
         if lengths and re.search(r"(?i)\blengths?\b.*\btimes?\W+(?:in\W+)?s(?:ec)?\b", text):
             self.units.append(Stated(lengths[0].unit.factor, f"{lengths[0].text}/s^2", place))
@@ -146,8 +147,8 @@ class TextStatements:
             f"{FACTOR}|{TRANSFORMED}", _BARE_STEP.sub("", rest), re.IGNORECASE
         ):
             self.factors.append(row)
-        for pattern, is_rate in ((_BARE_STEP, False), (_BARE_RATE, True)):
-            for match in pattern.finditer(rest):
+        for bare, is_rate in ((_BARE_STEP, False), (_BARE_RATE, True)):
+            for match in bare.finditer(rest):
                 number = float(match["number"].lower().replace("d", "e")) or nan
                 shown = f"{match['number']} {'Hz' if is_rate else 's'}"
                 self.steps.append(_step(number, shown, place, is_rate=is_rate))

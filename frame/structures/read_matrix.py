@@ -155,9 +155,9 @@ def _stated_factor(path: Path, member: str, quantity: str) -> float:
             quantity than the one asked for; or a value beside a unit that may be that of the
             numbers.
     """
-    stated = []
+    stated: list[Stated] = []
     kinds = {".sti": {"stiffness"}, ".mas": {"mass"}}.get(path.suffix.lower(), set())
-    unsure = []
+    unsure: list[Stated] = []
     cure = "write the matrix in N, m, kg, or say override = ['unit'] if the comment is wrong"
     for line, where_it_stands in _texts_in(path, member):
         place = f"{path.name}, {where_it_stands}"
@@ -165,12 +165,12 @@ def _stated_factor(path: Path, member: str, quantity: str) -> float:
         units = [one for one in mentions(line) if not is_name or (one.is_sure and not one.numbers)]
         rest = without_units(line, units)
         # "mass = weight / g" is a mass.
-        is_other = re.search(_OTHER_NUMBERS, rest) and not re.search(r"(?i)\bmass\w*\s*=", line)
+        is_mass = re.search(r"(?i)\bmass\w*\s*=", line) is not None
+        is_other = re.search(_OTHER_NUMBERS, rest) is not None and not is_mass
         # Of a unit in a script that is not known nothing would be seen.
-        is_other = is_other or (not units and re.search("[\u0370-\uffff]{2}", rest))
-        is_per_cent = any(x.dimension == "" and x.is_sure and not x.numbers for x in units)
+        is_other |= not units and re.search("[\u0370-\uffff]{2}", rest) is not None
+        is_other |= any(x.dimension == "" and x.is_sure and not x.numbers for x in units)
         allowed = "entries of stiffness, damping or mass in units"
-        is_other = is_other or is_per_cent
         require(is_name or not is_other, place, line.strip()[:60], allowed, cure)
         units = [x for x in units if x.dimension and not (x.numbers and _is_value_of_another(x))]
         is_of_numbers = (
@@ -197,8 +197,8 @@ def _stated_factor(path: Path, member: str, quantity: str) -> float:
     what = f"of {' and '.join(sorted(kinds))}, by {found or 'its ending'}"
     require(is_asked, path.name, what, f"of {quantity}", "name the file of that quantity")
     taken = found or Stated(1.0, "of SI")
-    for one in unsure:
-        settled(path.name, "unit", [one], taken)
+    for doubtful in unsure:
+        settled(path.name, "unit", [doubtful], taken)
     return taken.value
 
 
@@ -413,7 +413,7 @@ def _read_archive(path: Path, name: str, *, max_rows: int) -> Numbers:
     names = names_in_npz(path)
     if set(names) >= {"format", "shape", "data"}:  # as scipy.sparse.save_npz writes it
         shape = read_npz(path, "shape", kinds="iu")
-        require_size(path.name, tuple(shape.tolist()), max_rows)
+        require_size(path.name, tuple(int(n) for n in shape), max_rows)
         reader = "alphacut.frame.structures.read_matrix:dense_of_sparse"
         return read_apart(reader, path, library="SciPy")["matrix"]
     return read_npz(path, names[chosen_place(path.name, names, name)])

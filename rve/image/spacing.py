@@ -144,9 +144,9 @@ def _lengths_in(text: str, counts: Sequence[int]) -> Iterator[_Length]:
     for group in groups:
         first = group[0]
         if first.dimension in ("m-1 pixel", "m-1 voxel", "m pixel-1", "m voxel-1"):
-            side = (first.values[0] or math.nan) ** (-1 if "m-1" in first.dimension else 1)
+            length = (first.values[0] or math.nan) ** (-1 if "m-1" in first.dimension else 1)
             axes = (0, 1, 2) if "voxel" in first.dimension else (0, 1)
-            yield _Length(axes, Stated(side, first.shown))
+            yield _Length(axes, Stated(length, first.shown))
         elif first.dimension == "m3" and len(first.numbers) == 1 and "vox" in first.before.lower():
             yield _Length((VOLUME,), Stated(first.values[0], first.shown))
         elif first.dimension == "m" or (first.dimension == "m3" and len(first.numbers) == 3):
