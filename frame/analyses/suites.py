@@ -412,9 +412,11 @@ def thresholds_under(
         flow = make_flow(moved, cuts.names, record.duration, step / NODES, "exact")
         assert isinstance(flow, YieldingFlow)  # as there are thresholds
         values, peaks = flow.values_and_peaks(tried)
-        columns = [outputs.index(threshold.output) for threshold in asked]
-        of_record = zip(asked, np.moveaxis(values, -1, 0)[columns], peaks.T[columns], strict=True)
-        known.append([known_peaks(*of_threshold) for of_threshold in of_record])
+        columns = {output: k for k, output in enumerate(outputs)}
+        known.append([
+            known_peaks(x, values[..., columns[x.output]], peaks[:, columns[x.output]])
+            for x in asked
+        ])  # fmt: skip
     questions = [
         _questions(threshold, limit.number, found, is_in_cut, cuts.alpha)
         for threshold, limit, found in zip(asked, limits, np.swapaxes(known, 0, 1), strict=True)
@@ -436,9 +438,9 @@ def _tried(cuts: Boxes) -> tuple[Array, Mask]:
         ends_of_inputs = np.column_stack([lower, upper])
         points += [(lower + upper) / 2, *map(np.array, islice(product(*ends_of_inputs), 64))]
     # Cuts share corners, for example those of crisp inputs.
-    tried = np.unique(points, axis=0)
+    tried: Array = np.unique(points, axis=0)
     is_inside = (tried >= cuts.lower[:, np.newaxis]) & (tried <= cuts.upper[:, np.newaxis])
-    return tried, is_inside.all(axis=-1)
+    return tried, np.asarray(is_inside.all(axis=-1))
 
 
 def _questions(

@@ -453,7 +453,7 @@ def known_peaks(threshold: Threshold, values: Array, peaks: Array) -> Array:
     """
     # A trajectory is exact but for rounding, which the balance of its energy bounds.
     if threshold.side is None:
-        return peaks * np.array([[1 - MAX_IMBALANCE], [1 + MAX_IMBALANCE]])
+        return np.asarray(peaks * np.array([[1 - MAX_IMBALANCE], [1 + MAX_IMBALANCE]]))
     # Between the nodes of a side there may be more, so that nothing is known to keep the limit.
     outwards = values if threshold.side else -values
     least = outwards.max(axis=1) - MAX_IMBALANCE * np.abs(values).max(axis=1)
