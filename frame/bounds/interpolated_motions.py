@@ -259,24 +259,26 @@ def _passes_quietly(
     loads: LoadIntegrals, search: Search, j: int, phase: int, constant: float, interval: int,
     limit: float,
 ) -> bool:  # fmt: skip
-    """Return whether a motion has no event in an interval, and then move it to its end, in place.
+    """Return whether a motion has no event in a step, and then move it to its end, in place.
 
     Args:
         loads: The loads.
-        search: Where the motion is, at the beginning of the interval.
+        search: Where the motion is, a whole number of steps before the end of the interval.
         j: Number of the motion.
         phase: Direction of yielding, or 0.
         constant: c of an elastic storey.
         interval: The interval.
         limit: Force, or velocity against the direction of yielding, that is not passed at quarters
-            of the interval if there is no event.
+            of the step if there is no event.
     """
     step = search.step
+    t = search.time[j]
+    edge = loads.edges[interval + 1]
     rows = search.rows[j, abs(phase)]
     given = np.empty(rows.shape[1])
     states = len(rows) - 4
     given[:states] = search.state[j]
-    given[states:-1] = _cubic(loads, interval, loads.edges[interval], step).ravel()
+    given[states:-1] = _cubic(loads, interval, t, step).ravel()
     given[-1] = phase if phase else constant
     for m in range(len(rows)):
         value = 0.0
@@ -286,7 +288,7 @@ def _passes_quietly(
             search.state[j, m - 4] = value
         elif (-phase * value if phase else abs(value)) > limit:
             return False
-    search.time[j] = loads.edges[interval + 1]
+    search.time[j] = edge if edge - t < 1.5 * step else t + step
     return True
 
 
@@ -339,7 +341,8 @@ def _next_event(
     while search.time[j] < until:
         t = search.time[j]
         i = _interval(loads, t)
-        h = min(loads.edges[i + 1] - t, longest)
+        left = loads.edges[i + 1] - t
+        h = left / max(math.ceil(left / longest - 1e-9), 1)
         is_whole = t > after and abs(h - search.step) < 1e-9 * h
         if is_whole and not passes and _passes_quietly(
             loads, search, j, phase, constant, i, limit + tolerance
@@ -497,10 +500,11 @@ def march(
     spent = 0.0
     is_fixed = True
     is_fresh = True  # whether the next event is not known
+    interval = float(np.median(np.diff(loads.edges[: last + 1])))
     search = Search(
         time=t.copy(),
         state=start.copy(),
-        step=min(float(np.median(np.diff(loads.edges[: last + 1]))), longest),
+        step=interval / math.ceil(interval / longest - 1e-9),
         rows=np.empty((n_sets, 2, 4 + 2 * n, 2 * n + 4 * len(frames.follow) + 1)),
     )
     _fill_rows(frames, search.step, search.rows)

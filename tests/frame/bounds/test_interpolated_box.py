@@ -69,6 +69,16 @@ def test_motions_of_an_isolated_building_stay_inside_close_bounds(names, changes
             assert found.peaks.max(axis=1)[0] <= 1.01 * peaks.max(axis=0)[0]
 
 
+@pytest.mark.parametrize("ratio", [1.0, 10.0, 100.0, 1000.0])
+def test_stiff_storeys_widen_no_bounds_of_a_single_motion(ratio):
+    rng = np.random.default_rng(1)
+    frame = isolated_building(rng, 1)
+    k = frame.stiffness[0]
+    frame = replace(frame, stiffness=[k, ratio * k], rayleigh=(0.1, 0.0))
+    found, _, peaks = compared(frame, ("k1",), 1e-9, rng)
+    assert found.peaks.max(axis=1)[0] <= 1.0001 * peaks.max(axis=0)[0]
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
