@@ -8,6 +8,7 @@ import json
 import os
 import secrets
 from contextlib import redirect_stderr, redirect_stdout
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,23 @@ def pytest_collection_finish():
     """Spares the garbage collector the objects that stay."""
     gc.freeze()
     gc.enable()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def columns():
+    """Lets each row of an answer fail that has other columns than tests/columns.json lists."""
+    from alphacut.frame.analyses.answer import Answer
+
+    known = json.loads((ROOT / "tests/columns.json").read_text(encoding="utf-8"))
+    stated = Answer._stated
+
+    def of_known_columns(self, row):
+        heads = known.get(type(self).__name__, ["*"])
+        found = "|".join(row)
+        assert any(fnmatchcase(found, head) for head in heads), found
+        return stated(self, row)
+
+    Answer._stated = of_known_columns
 
 
 @pytest.fixture

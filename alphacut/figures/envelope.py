@@ -18,27 +18,6 @@ from alphacut.frame.analyses.peaks import Peak
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Nature
 from alphacut.stages.envelope import EnvelopeTask
-from alphacut.stages.summary import Parts, Results
-
-
-def envelope_of(results: Results, task: EnvelopeTask, name: str) -> Figure:
-    """Draw the envelope of an output in a study of a run.
-
-    Args:
-        results: Results of the run, with the envelope of this study.
-        task: The study.
-        name: Name of the output.
-    """
-    structure = results.structure
-    assert structure is not None  # of which the envelope is
-    parts = Parts.of(results)
-    return envelope(
-        results.envelopes[task.name].arrays,
-        Output(name, structure.unit(name)),
-        task,
-        parts.shown_units[name],
-        peak=parts.envelopes[task.name].peak.get(name),
-    )
 
 
 def envelope(

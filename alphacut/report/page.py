@@ -19,7 +19,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError
 from alphacut.base.number_text import ShownUnit, Table
 from alphacut.case.analyses import ANALYSES
-from alphacut.figures.register import FIGURES, caption
+from alphacut.figures.all import FIGURES, caption
 from alphacut.frame import Sensitivity
 from alphacut.frame.analyses.answer import table_of
 from alphacut.fuzzy.result import Nature, of_enclosing_box

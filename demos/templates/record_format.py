@@ -14,9 +14,8 @@ import re
 
 import numpy as np
 
-from alphacut.frame.records.networks import RecordFormat
 from alphacut.frame.records.recording import Recording
-from alphacut.frame.records.text_file import TextFile, recording_in_si, require_step
+from alphacut.frame.records.text_file import RecordFormat, TextFile, recording_in_si, require_step
 
 MARK = re.compile(r"ACME RECORDER\s+step\s+([0-9.eE+-]+) s\s+([0-9]+) samples\s*$")
 

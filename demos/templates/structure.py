@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from alphacut.case.structure import Mass, Stiffness, Structure, StructureSection
 from alphacut.frame import Accelerogram, Output
-from alphacut.frame.structures.linear import Assembly, LinearSystem
+from alphacut.frame.structures.linear import Assembly, LinearSystem, Number
+from alphacut.fuzzy import FuzzyNumber
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class RigModel(LinearSystem):
         """The nominal values by name, in SI units."""
         return {"mass": self.mass, "spring": self.spring}
 
-    def assembly(self, p: Mapping[str, Any]) -> Assembly:
+    def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
         """Return the matrices at many sets of parameters, arrays of one shape by name."""
         zero = p["mass"] * 0.0
         matrix = zero[..., None, None]
@@ -73,7 +73,9 @@ class Rig(StructureSection):
     mass: Mass
     spring: Stiffness
 
-    def structure(self, modulus: Any = None, loss: Any = None) -> Structure:
+    def structure(
+        self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
+    ) -> Structure:
         """Return the structure at nominal values, with its fuzzy parameters."""
         numbers = {"mass": self.mass, "spring": self.spring}
         return Structure(RigModel(self.mass.nominal, self.spring.nominal), numbers)

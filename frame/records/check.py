@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from alphacut.base.errors import RefusedError, require
-from alphacut.frame.records.networks import FORMATS, RecordFormat
-from alphacut.frame.records.text_file import TextFile
+from alphacut.frame.records.networks import FORMATS
+from alphacut.frame.records.text_file import RecordFormat, TextFile
 
 
 def check_record_format(one: RecordFormat, content: str) -> None:

@@ -12,7 +12,6 @@ Behind the samples there may be text, such as ``*** End Data ***``.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import takewhile
 from typing import NamedTuple
@@ -26,6 +25,7 @@ from alphacut.frame.records.stated_timing import StatedTiming, require_timing
 from alphacut.frame.records.text_file import (
     ACCELERATION_UNITS,
     NUMBER,
+    RecordFormat,
     TextFile,
     recording_in_si,
     require_step,
@@ -342,26 +342,6 @@ def _smc_peaks(reals: Array) -> list[StatedPeak]:
     if not 0 < time < 1e38:
         time = 0.0
     return [StatedPeak(0.01 * magnitude, time=time)]
-
-
-class RecordFormat(NamedTuple):
-    """A format of records with one channel a file.
-
-    Attributes:
-        name: Its name, for messages.
-        mark: How a line of such a file begins.
-        max_lines: In how many of its first lines the mark is looked for.
-        read: Function of the file, and of the unit that the user states or "", to the recording.
-    """
-
-    name: str
-    mark: re.Pattern[str]
-    max_lines: int
-    read: Callable[[TextFile, str], Recording]
-
-    def has_marked(self, file: TextFile) -> bool:
-        """Return whether a file is of this format by its mark."""
-        return any(self.mark.match(line) for line in file.lines[: self.max_lines])
 
 
 # The formats are tried in this order. PEER's is the last, since its words are the most common ones;

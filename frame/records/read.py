@@ -19,11 +19,17 @@ from alphacut.base.stated import Stated, settled
 from alphacut.base.units import ACCELERATION, factor_of
 from alphacut.frame.records.cosmos import is_cosmos, read_cosmos
 from alphacut.frame.records.geonet import is_geonet, read_geonet
-from alphacut.frame.records.networks import FORMATS, RecordFormat
+from alphacut.frame.records.networks import FORMATS
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak
 from alphacut.frame.records.tables import is_table, read_table
-from alphacut.frame.records.text_file import TextFile, choose_channel, read_bytes, recording_in_si
+from alphacut.frame.records.text_file import (
+    RecordFormat,
+    TextFile,
+    choose_channel,
+    read_bytes,
+    recording_in_si,
+)
 from alphacut.frame.records.uff import is_universal, read_uff_record
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from math import ceil, isfinite, nan
 from pathlib import Path
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -201,6 +201,26 @@ class TextFile:
             what = f"{count} samples, and {len(samples)} follow"
             cure = "load the file anew, or mend the number in the head"
             raise self.refusal(line, what, "as many samples as the head states", cure)
+
+
+class RecordFormat(NamedTuple):
+    """A format of records with one channel a file.
+
+    Attributes:
+        name: Its name, for messages.
+        mark: How a line of such a file begins.
+        max_lines: In how many of its first lines the mark is looked for.
+        read: Function of the file, and of the unit that the user states or "", to the recording.
+    """
+
+    name: str
+    mark: re.Pattern[str]
+    max_lines: int
+    read: Callable[[TextFile, str], Recording]
+
+    def has_marked(self, file: TextFile) -> bool:
+        """Return whether a file is of this format by its mark."""
+        return any(self.mark.match(line) for line in file.lines[: self.max_lines])
 
 
 def words_of(line: str, width: int) -> list[str]:

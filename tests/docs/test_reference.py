@@ -1,5 +1,6 @@
 """Public names have an entry in the built reference, and stand in `dir()` and tab completion."""
 
+import ast
 import importlib
 import rlcompleter
 import subprocess
@@ -19,6 +20,19 @@ def test_public_names_are_listed_and_completed(package):
     completer = rlcompleter.Completer({"module": module})
     for name in module.__all__:
         assert completer.complete(f"module.{name}", 0).startswith(f"module.{name}")
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_name_is_public_where_it_is_imported_and_says_its_module(package):
+    module = importlib.import_module(package)
+    names = {}  # of the imports: all, and those for type checkers alone, with their modules
+    for node in ast.walk(ast.parse(Path(module.__file__).read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and not node.module.endswith("first_use"):
+            names |= {alias.name: node.module.removeprefix(f"{package}.") for alias in node.names}
+    names.pop("TYPE_CHECKING")
+    assert sorted(names) == sorted(module.__all__)
+    assert module.AT_FIRST_USE.items() <= names.items()
+    assert all(hasattr(module, name) for name in names)
 
 
 def test_names_are_listed_without_importing_them():

@@ -18,7 +18,7 @@ import pytest
 
 from alphacut import main
 from alphacut.base.number_text import Table, range_text
-from alphacut.figures.register import FIGURES, caption
+from alphacut.figures.all import FIGURES, caption
 from alphacut.frame import Limit, Peak, SuitePeaks, decide
 from alphacut.fuzzy import Nature
 from alphacut.io.results import ResultsFolder

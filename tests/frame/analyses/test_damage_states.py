@@ -81,6 +81,7 @@ def test_the_first_storey_decides_and_every_structure_lies_in_the_ranges(found, 
         ):
             assert (ends.lower[0] <= own).all()
             assert (own <= ends.upper[0] * rounding).all()
+    assert found.table().head[-1] == "lognormal fit at the highest α"
     assert [row[0] for row in found.table().rows] == list(STATES)
 
 
