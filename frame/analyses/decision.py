@@ -100,8 +100,9 @@ class LimitDecision(LimitResult):
         of the box open, an undecided one says which. A lowest computed level other than 0 is
         then added: "not exceeded from α = 0.5 up".
         """
-        if self.verdict == "undecided" and self.peak is not None and self.peak.is_to_limits:
-            return f"{self.verdict}: {self.peak.cause}"
+        is_open = self.peak is not None and self.peak.is_to_limits and self.peak.cause
+        if self.verdict == "undecided" and is_open:
+            return f"{self.verdict}: {is_open}"
         # If all responses exceed the limit, a single one is no news.
         is_by_some = self.verdict == "can be exceeded"
         if not is_by_some or self.peak is None or not self.peak.reached_at:

@@ -7,7 +7,7 @@ part of the guaranteed bounds, and of the error of all others.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
@@ -518,6 +518,11 @@ def with_combined(
     return replace(peak, **changes)
 
 
+def widest_cause(peaks: Iterable[Peak]) -> str:
+    """Return why the bound is wide of those of several peaks, not mirrored, that is the largest."""
+    return max(peaks, key=lambda peak: float(peak.upper[0])).cause
+
+
 def largest_peaks(peaks: Mapping[str, Peaks] | Mapping[float, Peaks]) -> dict[str, Peak]:
     """Return bounds of the largest of a structure's peaks over all records, by the peak's name.
 
@@ -539,7 +544,7 @@ def largest_peaks(peaks: Mapping[str, Peaks] | Mapping[float, Peaks]) -> dict[st
         # under which the largest peak is attained. Smallest values of q have been turned into
         # largest values of -q (`outwards`), and are turned back at the end (`mirrored`).
         found = with_combined(
-            replace(farthest, nature=nature), of_records, np.max,
+            replace(farthest, nature=nature, cause=widest_cause(of_records)), of_records, np.max,
             "lower", "upper", "error", "reached", "least_lower",
         )  # fmt: skip
         if len(of_records) > 1:

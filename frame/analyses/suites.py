@@ -22,7 +22,14 @@ from alphacut.base.progress_bar import Progress, nth_subprogress
 from alphacut.frame.analyses.angles import TURN, angle_peaks, angle_response, turned_components
 from alphacut.frame.analyses.answer import Answer, Row
 from alphacut.frame.analyses.limits import Limit, thresholds_of
-from alphacut.frame.analyses.peaks import Peak, Peaks, close_peaks, largest_peaks, with_combined
+from alphacut.frame.analyses.peaks import (
+    Peak,
+    Peaks,
+    close_peaks,
+    largest_peaks,
+    widest_cause,
+    with_combined,
+)
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.nonlinear import make_flow
@@ -800,6 +807,7 @@ def mean_peaks(
         found[f"mean {name}"] = replace(
             mean,
             nature=Nature.weakest(peak.nature for peak in of_records),
+            cause=widest_cause(of_records),
             reached=reached,
             least_upper=np.full_like(reached, np.inf),  # no structure has a known small mean
             reached_at=reached_at,

@@ -137,3 +137,6 @@ def test_structures_with_small_peaks_under_each_record_have_none_under_both():
     both = largest_peaks({"first": {"q": peak}, "second": {"q": peak}})["q"]
     assert alone.min_peak_bounds.upper == 1
     assert both.min_peak_bounds.upper >= 3
+    wider = replace(peak, upper=4 * ones, reached=2 * ones, cause="open")
+    both = largest_peaks({"first": {"q": peak}, "second": {"q": wider}})["q"]
+    assert (both.reached, both.cause) == (3, "open")  # of the largest bound
