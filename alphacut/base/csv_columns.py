@@ -57,6 +57,32 @@ def length_columns(path: Path, columns: Sequence[str]) -> tuple[Ints, Array]:
     return np.array([line.row for line in rows]), values
 
 
+class ColumnHead(NamedTuple):
+    """Name of a column, and its unit, empty where its head states none."""
+
+    name: str
+    unit: str
+
+    @classmethod
+    def of(cls, cell: str, *dimensions: str) -> ColumnHead:
+        """Return name and unit from a cell of the head of a table.
+
+        A unit stands in brackets, "Accel. [g]" or "acc (g)", and may then be anything; or it is the
+        last words, "acc, g", "acc g", "acc_milli_g" or "f / Hz", and then must be of one of some
+        dimensions. Blanks and quotes around the cell are left out.
+        """
+        text = cell.strip(' "')
+        if match := re.fullmatch(r"(.*?)[\s,_/]*[\[(]\s*([^\])]*?)\s*[\])]?", text):
+            return cls(match[1], match[2])
+        # Without brackets the last words are a unit only if they are known and whole: "ground
+        # acceleration" has none.
+        text = re.sub(r"(?i)^(t|time|a|acc\w*|f|freq\w*)\s*/\s*", r"\1 ", text)
+        for match in re.finditer(r"[\s,_]+(?=[^\W\d]|[%‰])", text):
+            if factor_of(text[match.end() :], *dimensions):
+                return cls(text[: match.start()], text[match.end() :])
+        return cls(text, "")
+
+
 class Line(NamedTuple):
     """Number of a line, as an editor shows it, and its fields."""
 
@@ -67,8 +93,9 @@ class Line(NamedTuple):
 def fields(path: Path) -> list[Line]:
     """Return each line of a CSV file that is neither empty nor a comment, the header first.
 
-    The separator is the semicolon or the tab if the header has one, else the comma. Comments are
-    lines that begin with #.
+    The separator is the semicolon or the tab if the header has one, else the comma; commas between
+    digits are then decimal commas, unless numbers have points. Comments are lines that begin
+    with #.
 
     Returns:
         Number of each line as an editor shows it, from 1, and its fields; two lines at least.
@@ -84,9 +111,13 @@ def fields(path: Path) -> list[Line]:
         raise RefusedError(path.name, f"{len(texts)} lines", allowed)
     header = next(iter(texts.values()))
     separator = next((mark for mark in ";\t" if mark in header), ",")
+    # A comma beside another separator is a decimal comma, if no number has a point.
+    has_commas = separator != "," and not re.search(r"\d\.\d", "".join(texts.values()))
     # Line by line, so that each row keeps the number that an editor shows.
-    rows = []
+    rows: list[Line] = []
     for row, line in texts.items():
+        if has_commas and rows:
+            line = re.sub(r"(?<=\d),(?=\d)", ".", line)
         try:
             rows.append(Line(row, next(csv.reader([line], delimiter=separator))))
         except csv.Error:  # a field is too long
@@ -128,11 +159,7 @@ def number(path: Path, row: int, cells: Sequence[str], column: int) -> float:
     # `float` alone would take "nan", "1_000" and digits of other scripts.
     if len(text) > 100 or not NUMBER.fullmatch(text) or not isfinite(float(text)):
         allowed = "numbers such as 1.25 or 1e-3"
-        cure = ""
-        if re.search(r"\d[;,\t]\d", text):
-            cure = (
-                "separate fields by the same mark as those of the header, and write decimal points"
-            )
+        cure = "write decimal points, and separate fields by the mark of the header"
         key = f"{path.name}, row {row}, column {column + 1}"
         raise RefusedError(key, repr(text[:40]), allowed, cure)
     return float(text)
@@ -157,10 +184,9 @@ def _column(header: list[str], name: str, path: Path) -> tuple[int, float]:
     if name == "r":
         factors = {"r": 1.0, "radius": 1.0, "d": 0.5, "diameter": 0.5, "size": 0.5}
     for column, cell in enumerate(header):
-        # The name of the column, and its unit in round or square brackets.
-        match = re.fullmatch(r"\s*(\w+)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*", cell)
-        if match and match[1].lower() in factors and (metres := factor_of(match[2] or "", "m")):
-            return column, metres * factors[match[1].lower()]
+        head = ColumnHead.of(cell)
+        if head.name.lower() in factors and (metres := factor_of(head.unit, "m")):
+            return column, metres * factors[head.name.lower()]
     allowed = f"a column '{name} [mm]'"
     if name == "r":
         allowed += " or 'd [mm]'"

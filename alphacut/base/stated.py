@@ -73,7 +73,7 @@ def settled(
             if key in override:
                 return replace(said, remark=f"its own {key}, {each}, is overridden by {said}")
             cure = f'say {key} as the file does, or override = ["{key}"] if it is wrong'
-            raise RefusedError(name, f"of {key} {each}", f"{key} {said}, as is said", cure)
+            raise RefusedError(name, f"said to be of {key} {said}", f"{key} {each}", cure)
         first = first or each
         if said is None and not isclose(each.value, first.value, rel_tol=tolerance):
             cure = f'mend one, or say {key} and override = ["{key}"]'
@@ -81,11 +81,10 @@ def settled(
     doubtful = list(unsure)
     if first is None and said is not None and key not in override:
         is_among = any(isclose(x.value, said.value, rel_tol=tolerance) for x in doubtful)
-        shown = " and ".join(map(str, doubtful))
+        shown = " or ".join(map(str, doubtful))
         cure = f'say override = ["{key}"] if that is something else'
-        require(
-            is_among or not doubtful, name, f"of {key} {shown}", f"{key} {said}, as is said", cure
-        )
+        what = f"said to be of {key} {said}"
+        require(is_among or not doubtful, name, what, f"{key} {shown}", cure)
     return first or said
 
 

@@ -115,7 +115,7 @@ _LABEL = r"\b(?:acc\w*|ag?|times?|t|d[_\s]?t|f|freq\w*|disp\w*|vel\w*|[duvx]|int
 _LABEL += r"|mass\w*|stiff\w*|damp\w*|forces?|lengths?)"
 _ANNOUNCED = re.compile(
     rf"(?i)(?:[\[(]\s*|(?<=[a-z\d\]])_|{_LABEL}\s*[/_]\s*\(?"
-    r"|(?:\bunits?|_units?|einheit\w*|unidad\w*|unit[éèàa]\w*|\bin|\b(?:fraction|multiple)s?\s+of)"
+    r"|(?:\bunits?|_units?|einheit\w*|unidad\w*|unit[éèàa]\w*|単位は?|单位|\bin|\b(?:fraction|multiple)s?\s+of)"
     r"(?:\W|\b(?:of|are|is|in|de|en|acc\w*)\b)*)$"
 )
 _NAMED_NUMBERS = re.compile(r"(?i)\b(?:acc\w*|ordinates?|amplitudes?|values?|data)\W+$")
@@ -259,7 +259,7 @@ def _patterns() -> tuple[re.Pattern[str], re.Pattern[str]]:
         r"|\s+(squared|cubed)(?![a-z]))?"
     )
     # Names that end with a digit, as mps2, end where the digits do.
-    ended = r"(?![^\W\d_])(?!(?<=\d)\d)"
+    ended = r"(?![^\W\d_\u3040-\uffff])(?!(?<=\d)\d)(?!(?<=[\u3040-\uffff])[\u3040-\uffff])"
     atom = rf"(?:(square|sq\.?|cubic|cu\.?)\s+)?({name}){ended}{power}"
     # A blank joins a negative power, and what follows a force: "cm s-2" and "kN s/m".
     mark = (
@@ -349,7 +349,7 @@ def factor_of(text: str, *dimensions: str) -> float:
 def mentions(text: str) -> list[Mention]:
     """Return the units in a text with the numbers beside them, from left to right."""
     plain = text.translate(_SUPERSCRIPTS)
-    if not any(map(word_of, re.findall(r"[^\W\d_]+|[%‰°]", plain))):
+    if not any(map(word_of, re.findall(r"[^\W\d_\u3040-\uffff]+|[\u3040-\uffff]+|[%‰°]", plain))):
         return []  # without the patterns, which take 40 ms to make
     spans = list(_spans(plain))
     found: list[Mention] = []
@@ -405,7 +405,9 @@ _NAME = re.compile(
 def _spans(text: str) -> Iterator[tuple[int, _Parsed]]:
     """Yield where units begin in a text, and their atoms; none stands within another."""
     end = 0
-    for match in re.finditer(r"(?<![^\W\d_])[^\W_]|[%‰°]", text):
+    # Signs of Chinese, Japanese and Korean stand beside a unit without a blank.
+    starts = r"(?<![^\W\d_\u3040-\uffff])[^\W_\u3040-\uffff]|(?<![^\W\d_])[^\W_]|[%‰°]"
+    for match in re.finditer(starts, text):
         start = match.start()
         if start < end or (match[0].isdigit() and not re.match(r"10\s*\*?\s*g\b", text[start:])):
             continue

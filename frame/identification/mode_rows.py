@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.csv_columns import fields, number, text_of
+from alphacut.base.csv_columns import ColumnHead, fields, number, text_of
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.stated import Stated, settled
 from alphacut.base.units import (
@@ -92,7 +91,7 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
     if rows and all(cell.strip(" -–[]()") == "" or unit_of(cell) for cell in rows[0].cells):
         cells_of_units = [cell.strip(" -–") for cell in rows.pop(0).cells]
     for column, cell in enumerate(header):
-        title = _title(cell)
+        title = ColumnHead.of(cell, FREQUENCY)
         name = title.name
         if re.fullmatch(r"(?i)(?:nat(?:ural|\.) |eigen|modal )?freq(?:uency|\.)?|f_?n?", name):
             name = "frequency"
@@ -102,19 +101,12 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
         units[name] = title.unit or "".join(cells_of_units[column : column + 1])
     place = f"{path.name}, header"
     shown = ",".join(header)[:80]
+    lines = enumerate(text_of(path).splitlines(), 1)
+    comments = {f"line {k}": x for k, x in lines if x.startswith("#") and k != head_row}
+    has_deviations = bool({"frequency_std", "shape_std"} & columns.keys())
     if not override:
-        comments = [x for x in text_of(path).splitlines() if x.startswith("#")]
-        for text in [*header, *comments]:
-            rest = without_units(text, mentions(text)).strip(" #")
-            # Shapes may be normalised.
-            clauses = [x for x in re.split("[,;]", rest) if not re.search("(?i)shape|vector", x)]
-            is_other = any(re.search(_OTHER_NUMBERS, clause) for clause in clauses)
-            is_other |= re.search(r"(?i)(?:%|\bper\s?cent)\s+of\b", text) is not None
-            if {"frequency_std", "shape_std"} & columns.keys():
-                is_other |= re.search(_RELATIVE, text) is not None
-            cure = "write frequencies in Hz, ω/(2π) or 1/T, and deviations in Hz, without a factor"
-            allowed = "frequencies, not angular ones or periods"
-            require(not is_other, place, text[:80], allowed, cure)
+        for text in (*header, *comments.values()):
+            _require_frequencies(place, text, has_deviations=has_deviations)
     allowed = (
         "mode,frequency [Hz],q1,q2 … with the floors that were measured, in one unit; frequency_std"
         " [Hz] and shape_std may stand before q1"
@@ -125,17 +117,9 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
     )
     is_known = is_known and len({x for name, x in units.items() if name[0] == "q"}) < 2
     require(is_known, place, shown, allowed)
-    stated: list[Stated] = []
-    unsure: list[Stated] = []
-    if not override:
-        of_head = [x for name, x in units.items() if name[:1] == "f" and x]
-        stated = [Stated(_hertz_of(place, x), x, place) for x in of_head]
-        for row, line in enumerate(text_of(path).splitlines(), 1):
-            if line.startswith("#") and row != head_row:
-                for one in mentions(line):
-                    _add_unit(one, f"line {row}", path.name, stated, unsure)
-    said = Stated(_hertz_of("frequency_unit", unit), unit) if unit else None
-    found = settled(path.name, "frequency_unit", stated, said, unsure=unsure)
+    of_head = [x for name, x in units.items() if name[:1] == "f" and x and not override]
+    stated = [Stated(_hertz_of(place, x), x, place) for x in of_head]
+    found = unit_of_frequencies(path.name, stated, comments, unit, override=override)
     cure = "write the unit into the header, frequency [Hz], or say frequency_unit"
     if found is None:
         raise RefusedError(place, f"{shown}, without a unit", "frequencies with a unit", cure)
@@ -161,28 +145,59 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
     )
 
 
-class _Title(NamedTuple):
-    """Name and unit in the head of a column."""
+def unit_of_frequencies(
+    name: str,
+    stated: Sequence[Stated],
+    texts: Mapping[str, str],
+    unit: str,
+    *,
+    override: Collection[str],
+) -> Stated | None:
+    """Return the unit of frequencies on which a file and its user agree, as a factor to Hz.
 
-    name: str
-    unit: str
+    Args:
+        name: Name of the file, for messages.
+        stated: Units that the file states in their place.
+        texts: Its comments, by where they stand.
+        unit: What the user says; may be empty.
+        override: "frequency_unit", where the file states a wrong one.
+
+    Returns:
+        None if nobody states it.
+
+    Raises:
+        RefusedError: Two disagree, or one is that of an angular frequency or of a period.
+    """
+    own = list(stated)
+    unsure: list[Stated] = []
+    for place, text in texts.items():
+        if not override:
+            for one in mentions(text):
+                _add_unit(one, place, name, own, unsure)
+    said = Stated(_hertz_of("frequency_unit", unit), unit) if unit else None
+    return settled(name, "frequency_unit", own, said, override=override, unsure=unsure)
 
 
-def _title(cell: str) -> _Title:
-    """Return name and unit of a cell of the header, as "f [Hz]", "f / Hz" or "f_Hz"."""
-    match = re.fullmatch(r"\s*([\w .]*?)[\s,_]*[\[(]\s*([^\])]*?)\s*[\])]\s*", cell)
-    if match is None:
-        match = re.fullmatch(r"\s*([\w .]*?)\s*[/_ ]\s*(\S+)\s*", cell)
-        if match is None or not factor_of(match[2], FREQUENCY):
-            return _Title(cell.strip(), "")
-    return _Title(match[1], match[2])
+def _require_frequencies(place: str, text: str, *, has_deviations: bool) -> None:
+    """Raise RefusedError where a text says that numbers are no frequencies in a unit."""
+    rest = without_units(text, mentions(text)).strip(" #")
+    # Shapes may be normalised.
+    clauses = [x for x in re.split("[,;]", rest) if not re.search("(?i)shape|vector", x)]
+    is_other = any(re.search(_OTHER_NUMBERS, clause) for clause in clauses)
+    is_other |= re.search(r"(?i)(?:%|\bper\s?cent)\s+of\b", text) is not None
+    is_other |= has_deviations and re.search(_RELATIVE, text) is not None
+    cure = "write frequencies in Hz, ω/(2π) or 1/T, and deviations in Hz, without a factor"
+    allowed = "frequencies, not angular ones or periods"
+    require(not is_other, place, text[:80], allowed, cure)
 
 
 def _hertz_of(place: str, unit: str) -> float:
     """Return Hz in a unit of frequency; refuse others, angular ones among them."""
     hertz = factor_of(unit, FREQUENCY)
     if hertz not in (1.0, 1e3, 1e-3):
-        cure = "divide by 2π, or by 60" if unit_of(unit) else ""
+        parsed = unit_of(unit)
+        cures = {"s": "write 1/T, in Hz, for periods T", "rad s-1": "write ω/(2π), in Hz, for ω"}
+        cure = cures.get(parsed.dimension, "write them in Hz") if parsed else ""
         raise RefusedError(place, f"in {unit}", "frequencies in Hz, kHz or cycles/s", cure)
     return hertz
 
@@ -206,11 +221,12 @@ def _add_unit(
     is_named = re.search(r"(?i)\bunit", one.before) is not None
     is_angular = one.dimension in ("rad s-1", "cycle rad s-1", "s-1", "cycle2 s-2", "rad2 s-2")
     is_period = one.dimension == "s" and one.is_sure and not one.numbers
+    is_of_all = re.search(r"(?i)\b(?:in|units?(?:\s+of)?)\W*$", one.before) is not None
+    is_angular = is_angular and (is_of_all or not one.numbers)
     if (is_angular or is_period) and (is_named or not is_of_others):
         _hertz_of(f"{name}, {place}", one.text)
     if one.dimension != FREQUENCY or (is_of_others and not is_named):
         return
-    is_of_all = re.search(r"(?i)\b(?:in|units?(?:\s+of)?)\W*$", one.before) is not None
     if is_of_all or not one.numbers:
         text = f"a multiple, {one.shown}{one.behind[:9]}" if one.is_multiple else one.text
         hertz = _hertz_of(f"{name}, {place}", text)
@@ -254,15 +270,15 @@ def _measurements_of_mode(
     require(is_moved, f"{path.name}, mode {mode}", "0 at every floor", allowed)
 
     frequencies = values[:, columns["frequency"]]
+    largest = max((float(abs(x).mean()) for x in shape.values()), default=np.nan)
+    deviation = _relative_deviation(values, columns.get("frequency_std"), frequencies.mean())
+    of_shape = _relative_deviation(values, columns.get("shape_std") if shape else None, largest)
+    return ModeRows(mode, frequencies, shape, deviation, of_shape)
+
+
+def _relative_deviation(values: Array, column: int | None, scale: float) -> float | None:
+    """Return the mean of a column of deviations over a scale; None without a column."""
+    if column is None:
+        return None
     # Independent deviations of several measurements are averaged by their squares.
-    deviations = {}  # root mean squares
-    for name in ("frequency_std", "shape_std"):
-        if name in columns:
-            deviations[name] = float(np.sqrt((values[:, columns[name]] ** 2).mean()))
-    frequency_deviation = shape_deviation = None
-    if "frequency_std" in deviations:
-        frequency_deviation = deviations["frequency_std"] / float(frequencies.mean())
-    if "shape_std" in deviations and shape:
-        largest = max(abs(amplitudes).mean() for amplitudes in shape.values())
-        shape_deviation = deviations["shape_std"] / float(largest)
-    return ModeRows(mode, frequencies, shape, frequency_deviation, shape_deviation)
+    return float(np.sqrt((values[:, column] ** 2).mean()) / scale)

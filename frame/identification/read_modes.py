@@ -36,7 +36,8 @@ def read_modes(
             likewise.
         floors: For a universal file, the floor of each unknown that was measured, by
             NODE.DIRECTION, as ``{"12.x": 1}``.
-        frequency_unit: Unit of the frequencies of a CSV file that states none, as "Hz".
+        frequency_unit: Unit of the frequencies of a CSV file that states none, as "Hz". Another one
+            than the file states is refused.
         override: ``["frequency_unit"]`` where the file states a wrong one.
 
     Returns:
@@ -60,12 +61,12 @@ def read_modes(
             checked_number(key, deviation, positive=True)
     require_overrides(override, ("frequency_unit",))
     file = path_of("path", path)
+    warn_of_overrides(file.name, override)
     if file.suffix.lower() in (".uff", ".unv"):
         require(bool(floors), "floors", None, "the floors of its unknowns")
-        found = uff_mode_rows(file, floors or {})
+        found = uff_mode_rows(file, floors or {}, frequency_unit, override)
     else:
         require(not floors, "floors", floors, "left out beside a CSV file")
-        warn_of_overrides(file.name, override)
         found = mode_rows(file, frequency_unit, override)
     modes = []
     for rows in found:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from math import ceil
 from pathlib import Path
 from typing import NamedTuple
@@ -11,12 +11,15 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
-from alphacut.frame.identification.mode_rows import ModeRows
+from alphacut.base.stated import Stated
+from alphacut.frame.identification.mode_rows import ModeRows, unit_of_frequencies
 from alphacut.frame.records.text_file import read_bytes
 from alphacut.frame.records.uff import COMPLEX, DIRECTIONS, data_sets, floats
 
 
-def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]:
+def uff_mode_rows(
+    path: Path, floors: Mapping[str, int], unit: str = "", override: Collection[str] = ()
+) -> tuple[ModeRows, ...]:
     """Read the modes of a universal file, by rising number, with one measurement each.
 
     They stand in data sets 55 or 2414 of normal or complex modes; others are passed over. If only
@@ -25,9 +28,12 @@ def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]
     Args:
         path: The file.
         floors: Floor of each measured unknown, named NODE.DIRECTION, such as ``{"12.x": 1}``.
+        unit: Unit of the frequencies that the user says; the format has Hz.
+        override: "frequency_unit", where the file has another one.
 
     Raises:
-        RefusedError: Two unknowns belong to one floor, the file has no mode, a data set is damaged,
+        RefusedError: The user, or a line of text in the file, states another unit or quantity;
+            two unknowns belong to one floor, the file has no mode, a data set is damaged,
             a mode is given twice, a frequency is not positive and finite, an unknown is missing or
             not finite, or the phases of a shape differ too much for a real shape.
     """
@@ -49,9 +55,14 @@ def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]
             continue
         mode = found.mode
         hertz = found.hertz
-        key = f"{path.name}, data set 55"
-        require(mode not in modes, key, f"mode {mode} again", "each mode once")
         key = f"{path.name}, mode {mode}"
+        require(mode not in modes, key, "there again", "each mode once")
+        # Displacements, velocities and accelerations of a mode are multiples of one another.
+        require(found.quantity in (0, 8, 11, 12), key, f"of result type {found.quantity}", "type 8")
+        own = [Stated(1.0, "Hz", "by the format")]
+        texts = {f"line {text!r} of mode {mode}": text for text in found.texts}
+        factor = unit_of_frequencies(path.name, own, texts, unit, override=override)
+        hertz *= factor.value if factor else 1.0
         require(0 < hertz < np.inf, f"{key}: frequency", f"{hertz:g} Hz", "above 0 Hz")
         shape = _real_amplitudes(key, found.amplitudes, floors)
         if len(shape) < 2:
@@ -67,11 +78,15 @@ class UffShape(NamedTuple):
     Args:
         mode: Number of the mode.
         hertz: Natural frequency, in Hz.
+        quantity: Code of what the amplitudes are, as 8 of displacements.
+        texts: Lines of text in its head.
         amplitudes: Complex amplitudes by NODE.DIRECTION.
     """
 
     mode: int
     hertz: float
+    quantity: int
+    texts: list[str]
     amplitudes: dict[str, complex]
 
 
@@ -101,7 +116,7 @@ def _parse_shape(head: list[str], values: list[str]) -> UffShape | None:
     # The line of codes has six: of the model, the analysis (2 of normal modes, 3 and 7 of
     # complex modes of first and second order), the kind of the data (as of a displacement in three
     # directions), its meaning, the type of its numbers, and their count at a node.
-    _, analysis, _, _, kind, size = (int(word) for word in head[code_line].split()[:6])
+    _, analysis, _, quantity, kind, size = (int(word) for word in head[code_line].split()[:6])
     is_normal = analysis == 2
     is_complex = analysis in (3, 7)
     if not (is_normal or is_complex):
@@ -131,7 +146,8 @@ def _parse_shape(head: list[str], values: list[str]) -> UffShape | None:
     # The seventh line of a data set 55 has the counts of its codes and of its numbers, the load
     # case and the mode; the tenth of a data set 2414 has the mode as its sixth number.
     mode = int(head[mode_line].split()[5 if is_2414 else 3])
-    return UffShape(mode, hertz, amplitudes)
+    texts = [head[1], *head[3:8]] if is_2414 else head[:5]
+    return UffShape(mode, hertz, quantity, texts, amplitudes)
 
 
 def _real_amplitudes(

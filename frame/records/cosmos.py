@@ -167,8 +167,7 @@ def _read_cosmos(file: TextFile, channel: _Channel, unit: str) -> Recording:
     peak = float(header[63])  # entry 64 of the format's description, which counts from 1
     to_si = factor_of(unit, ACCELERATION)
     if peak != -999 and to_si:  # -999 stands for an entry that is not known
-        time = max(float(header[64]), 0.0)  # -999 as well
-        stated.append(StatedPeak(to_si * abs(peak), time=time))
+        stated.append(StatedPeak(to_si * abs(peak)))
     step = _cosmos_step(file, channel.reals, header, count=count, duration=duration)
     return recording_in_si(
         file.location(channel.line),

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from math import ceil
 from typing import ClassVar
 
-from alphacut.base.arrays import Array
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak
 from alphacut.frame.records.stated_timing import (
@@ -120,7 +119,11 @@ def read_geonet(file: TextFile, channel: str = "") -> Recording:
         names.append(tuple(filter(None, (str(number), component.name))))
     chosen = choose_channel(file.location(0), channel, names)
     component = components[chosen]
-    reals = _reals(file, component.samples - 6)
+    first = component.samples - 6
+    reals = file.head_numbers(first, 6, width=component.width, layout=component.layout)
+    if len(reals) != 60:
+        allowed = "60 reals, of which 26 is the step"
+        raise file.refusal(first, f"{len(reals)} reals", allowed, "load the file anew")
     samples = file.fixed_columns(
         component.samples,
         count=component.count,
@@ -132,7 +135,7 @@ def read_geonet(file: TextFile, channel: str = "") -> Recording:
     # The places are counted from 0, the numbers of the format's description from 1.
     step = float(reals[25])
     timing = list(timing_in_text(file, component.start, component.samples - 10))
-    timing.append(StatedTiming(component.samples - 4, duration=float(reals[23])))
+    timing.append(StatedTiming(component.samples - 4, "duration", float(reals[23])))
     require_timing(file, component.samples - 7, timing, count=component.count, step=step)
     return recording_in_si(
         file.location(component.samples - 6),
@@ -141,8 +144,8 @@ def read_geonet(file: TextFile, channel: str = "") -> Recording:
         step,
         samples,
         " ".join(names[chosen]),
-        # The peak in mm/s² and its time in s.
-        stated=[StatedPeak(1e-3 * abs(float(reals[35])), time=float(reals[36]))],
+        # The peak in mm/s².
+        stated=[StatedPeak(1e-3 * abs(float(reals[35])))],
     )
 
 
@@ -153,12 +156,3 @@ def _components(file: TextFile) -> Iterator[_Component]:
         component = _Component.of(file, start)
         yield component
         start = component.end
-
-
-def _reals(file: TextFile, first: int) -> Array:
-    """Return the 60 reals of a head from their first line on, or raise RefusedError."""
-    reals = file.head_numbers(first, 6, width=_Component.width, layout=_Component.layout)
-    if len(reals) != 60:
-        allowed = "60 reals, of which 26 is the step"
-        raise file.refusal(first, f"{len(reals)} reals", allowed, "load the file anew")
-    return reals

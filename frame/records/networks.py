@@ -12,8 +12,8 @@ Behind the samples there may be text, such as ``*** End Data ***``.
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from dataclasses import replace
-from itertools import takewhile
 from typing import NamedTuple
 
 from alphacut.base.arrays import Array
@@ -196,8 +196,8 @@ def read_esm(file: TextFile, unit: str) -> Recording:
     """Return the recording in a file of ESM or ITACA: lines ``KEY: value``, then one sample a line.
 
     SAMPLING_INTERVAL_S, the step in s, and NDATA, the count of samples, must be there. UNITS,
-    DATA_TYPE (an acceleration if it is missing), STREAM (the channel), DURATION_S, PGA_CM/S^2 (the
-    peak) and TIME_PGA_S may be missing.
+    DATA_TYPE (an acceleration if it is missing), STREAM (the channel), DURATION_S and PGA_CM/S^2
+    (the peak) may be missing.
 
     Args:
         file: The file.
@@ -212,7 +212,7 @@ def read_esm(file: TextFile, unit: str) -> Recording:
             fewer than stated; the step is not from 4e-5 s to below 0.5 s; or the samples have
             another duration or peak than the head states.
     """
-    head = dict[str, _EsmField]()
+    head = defaultdict[str, _EsmField](lambda: _EsmField("", 0))
     for row, line in enumerate(file.lines):
         pattern = r"([A-Z][A-Z0-9_/.^]*(?: [A-Z0-9_/.]+)*)\s*:\s*(.*)"
         if match := re.fullmatch(pattern, line.strip()):
@@ -222,14 +222,14 @@ def read_esm(file: TextFile, unit: str) -> Recording:
     numbers = []
     # An empty text matches no number, so a missing key is refused like a wrong one.
     for key, example in (("SAMPLING_INTERVAL_S", "0.005"), ("NDATA", "4000")):
-        text, row = head.get(key, _EsmField("", 0))
+        text, row = head[key]
         if not NUMBER.fullmatch(text) or float(text) <= 0:
             cure = f"load the file anew, or write {key}: {example}"
             raise file.refusal(row, f"{key}: {text}", "a number above 0", cure)
         numbers.append(float(text))
     step, count = numbers
-    kind = head.get("DATA_TYPE", _EsmField("ACCELERATION", 0))
-    if "ACCELERATION" not in kind.text.upper():
+    kind = head["DATA_TYPE"]
+    if kind.text and "ACCELERATION" not in kind.text.upper():
         cure = "take the file of the acceleration"
         allowed = f"accelerations in {ACCELERATION_UNITS}"
         raise file.refusal(kind.line, kind.text, allowed, cure)
@@ -237,21 +237,20 @@ def read_esm(file: TextFile, unit: str) -> Recording:
     samples = file.numbers(1 + max(field.line for field in head.values()), len(file.lines))
     file.require_count(samples, int(count), head["NDATA"].line)
     step_line = head["SAMPLING_INTERVAL_S"].line
-    duration = head.get("DURATION_S", _EsmField("", 0))
+    duration = head["DURATION_S"]
     if NUMBER.fullmatch(duration.text):
-        stated = [StatedTiming(duration.line, duration=float(duration.text))]
+        stated = [StatedTiming(duration.line, "duration", float(duration.text))]
         require_timing(file, step_line, stated, count=int(count), step=step)
-    own_unit = head.get("UNITS", _EsmField(unit, step_line))
-    peak = head.get("PGA_CM/S^2", _EsmField("", 0)).text
-    peak_time = head.get("TIME_PGA_S", _EsmField("", 0)).text
+    own_unit = head["UNITS"] if "UNITS" in head else _EsmField(unit, step_line)
+    peak = f"PGA: {head['PGA_CM/S^2'].text} cm/s^2"
     return recording_in_si(
         file.location(own_unit.line),
         "ESM",
         own_unit.text,
         step,
         samples,
-        head.get("STREAM", _EsmField("", 0)).text,
-        stated=peaks_in_text([f"PGA: {peak} cm/s^2 at {peak_time} s"], "cm/s^2"),
+        head["STREAM"].text,
+        stated=peaks_in_text([peak], "cm/s^2"),
     )
 
 
@@ -262,7 +261,7 @@ def read_smc(file: TextFile, unit: str) -> Recording:
     of 50 reals in columns of 15 characters. Behind it stand as many lines of comments as the head
     says, and then the samples, 8 in a line of columns of 10 characters. Integer 13 is the angle of
     the sensor from the vertical in degrees, 16 counts the comments and 17 the samples; real 2 is
-    the count of samples in a second; reals 30 and 32 are the extremes, 29 and 31 their times. All
+    the count of samples in a second; reals 30 and 32 are the extremes. All
     are counted from 1.
 
     Args:
@@ -274,8 +273,8 @@ def read_smc(file: TextFile, unit: str) -> Recording:
 
     Raises:
         RefusedError: The first line does not begin with 1 or 2, the numbers of accelerograms; the
-            head has more or fewer lines or numbers; it counts other comments than there are, fewer
-            than two samples, or a rate that is not above 0; samples are missing or are no numbers;
+            head has more or fewer lines or numbers; it counts fewer than two samples, or a rate
+            that is not above 0; samples are missing or are no numbers;
             the step is not from 4e-5 s to below 0.5 s; or the samples have another peak than the
             head.
     """
@@ -294,14 +293,6 @@ def read_smc(file: TextFile, unit: str) -> Recording:
     # The places below are counted from 0, those of the format's description from 1.
     is_vertical = integers[12] in (0, 180)
     n_comments = max(int(integers[15]), 0)  # the format's number for none is -32768
-    comments = file.lines[comments_line:]
-    n_marked = len(list(takewhile(lambda line: line.startswith("|"), comments)))
-    if n_marked != n_comments:
-        what = f"{n_comments} lines of comments, and {n_marked} with | follow"
-        allowed = "as many comments as integer 16 of the head states"
-        raise file.refusal(
-            integers_line + 1, what, allowed, "load the file anew, or mend integer 16"
-        )
     count = int(integers[16])
     rate = float(reals[1])
     if not (count > 1 and rate > 0):
@@ -328,20 +319,11 @@ def read_smc(file: TextFile, unit: str) -> Recording:
 
 
 def _smc_peaks(reals: Array) -> list[StatedPeak]:
-    """Return the peak in the 50 reals of an SMC file's head; an empty list if it states none.
-
-    The peak is in m/s², and its time in s, 0 if the head does not state it.
-    """
-    # Places counted from 0: the largest and the smallest sample in cm/s², behind their times in s.
-    # The format's number for none is 1.7e38.
-    extremes = [(abs(float(reals[place])), float(reals[place - 1])) for place in (29, 31)]
-    stated = [(magnitude, time) for magnitude, time in extremes if magnitude < 1e38]
-    if not stated:
-        return []
-    magnitude, time = max(stated)
-    if not 0 < time < 1e38:
-        time = 0.0
-    return [StatedPeak(0.01 * magnitude, time=time)]
+    """Return the peak in the 50 reals of an SMC file's head, in m/s²; none if it states none."""
+    # Places counted from 0: the largest and the smallest sample in cm/s². The format's number for
+    # none is 1.7e38.
+    stated = [abs(float(reals[place])) for place in (29, 31) if abs(reals[place]) < 1e38]
+    return [StatedPeak(0.01 * max(stated))] if stated else []
 
 
 # The formats are tried in this order. PEER's is the last, since its words are the most common ones;

@@ -112,9 +112,7 @@ def _read_by_marks(
     """Read a recording from a file of the format whose marks its content has.
 
     Marks that are sure go first: those of universal files (UFF) and of miniSEED and SAC, which are
-    binary, then those of text formats, and at last a table of numbers, which has no mark. Numbers
-    alone are not taken from a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format
-    with a head, unless the user says how to read them.
+    binary, then those of text formats, and at last a table of numbers, which has no mark.
 
     Args:
         path: The file.
@@ -152,21 +150,11 @@ def _read_by_marks(
         further: RecordFormat = resolve_name(place)
         if further.has_marked(file):
             return further.read(file, unit)
+    if is_table(file):
+        return read_table(file, step, unit, channel, override)
     others = "COSMOS, CSMIP, GeoNet V2A, miniSEED, SAC, UFF 58, CSV"
     allowed = ", ".join([*(known.name for known in FORMATS), others])
-    is_described = bool(channel or (step and unit))
-    if is_table(file, is_described=is_described):
-        is_named = path.suffix.lower() in (".at2", ".v1", ".v2", ".v2a", ".smc")
-        begins_with_number = re.match(rb"\s*[-+]?\.?[0-9]", content) is not None
-        value = "without the head that files of this name begin with"
-        cure = "load it anew; numbers alone take records.step and records.unit"
-        # A file of these names that is numbers alone has lost its head, and with it unit and step.
-        # Who states the unit knows that; beside times the step is not needed.
-        lost_head = is_named and begins_with_number and not (unit or channel)
-        require(not lost_head, path.name, value, allowed, cure)
-        return read_table(file, step, unit, channel, override)
-    cure = "" if is_described else "numbers alone are read with records.step and records.unit"
-    raise RefusedError(path.name, "of no format that is read", allowed, cure)
+    raise RefusedError(path.name, "of no format that is read", allowed)
 
 
 def _waveform_format(content: bytes) -> str:

@@ -52,8 +52,8 @@ class Recording:
         """Yield clauses on what a user should look at, as "its step is 0.2 s: check it".
 
         First come the remarks that reading the file has left. Then follow clauses on a peak above 5
-        g, on a step that is not from 1e-4 to 0.1 s, and on a channel whose name says that it is
-        vertical. Nothing is yielded if all is as usual.
+        g, and on a channel whose name says that it is vertical. Nothing is yielded if all is as
+        usual.
 
         Args:
             is_vertical: Whether it is used as the vertical component.
@@ -62,9 +62,6 @@ class Recording:
         peak_in_g = self.peak / STANDARD_GRAVITY
         if peak_in_g > 5:  # the largest that instruments have recorded on the ground is about 4
             yield f"its peak is {peak_in_g:.3g} g: check the unit {self.unit}"
-        # Instruments sample 50 to 1000 times a second, and simulations at least ten times.
-        if not 1e-4 <= self.step <= 0.1:
-            yield f"its step is {self.step:g} s: check it"
         # Vertical channels have one of these words, or a SEED code such as HNZ. The words must
         # stand alone: "v" is vertical in "090 V", and not in "HNV1".
         words = "up|dn|down|ud|u-d|v|vert|vertical|z|[A-Z][HNLG]Z"

@@ -31,7 +31,7 @@ _SITE = r"(?i)altitude|height|elevation|depth|coordinate|vs_?30|\bwave|peak|pg[v
 FACTOR = (
     r"(?:[x×*·]\s*|\b)10\s*(?:\^|\*\*|⁻|[²³⁴⁵⁶])|[x×*·]\s*10\s*[-−]\s*\d|\b1\.?0*e[-+]?\d"
     r"|(?<![a-z_])[x×*·]\s*(?:1000*\b|0?\.\d)"
-    r"|\b(?:scal\w*[\s_]*factor|scal\w*(?=\s*[:=])|multipl\w*|divided|conversion)[\s:=]*(?:(?:by|with)\s+)?"
+    r"|\b(?:scal\w*[\s_]*factor|scal\w*(?=\s*[:=])|(?:multipl\w*|divide\w*)(?:\s+[a-z]+){0,6}|conversion)[\s:=]*"
     r"(?!1(?:\.0*)?\b)[\d.]|\btimes\s+(?:\d|t\w+)|\bfactor\s*(?:of\s+)?[:=]?\s*(?!1\b)\d|(?<=[a-z])\s*/\s*10+\b"
 )
 # Words of times between samples, in some languages, and words of other times and frequencies.
@@ -59,6 +59,8 @@ _BARE_RATE = re.compile(
     rf"|^\W*rate(?=\s*[:=])){_BEHIND}{_NUMBER}",
     re.IGNORECASE,
 )
+# A number that stands alone, and is part of no word, date, time or list.
+_LONE_NUMBER = re.compile(r"(?<![\w.,:/+-])(?:\d+[.,]?\d*|\.\d+)(?![\w:/-]|[.,]\d)")
 _COUNT = re.compile(
     r"\b(?:npts?|ndata|n_?samples|points|samples|n(?:umber|o|um|r)?\.?\s*(?:of)?\s*"
     r"(?:data|points|samples|values|pts))\s*[:=]\s*(\d+)\b(?![./:-])",
@@ -76,7 +78,9 @@ class TextStatements:
         peak_units: Those of peaks.
         unsure_units: Units that may be other words.
         steps: Times between samples, in s.
-        unsure_steps: Times, and the reciprocals of frequencies, that may be other ones.
+        unsure_steps: Times, and the reciprocals of frequencies, that may be other ones; and numbers
+            of unknown meaning in lines on sampling.
+        lone_steps: Other numbers of unknown meaning that are those of usual steps or rates.
         durations: Durations, in s.
         counts: Numbers of samples.
         quantities: Lines that name another quantity than an acceleration, by its name.
@@ -89,6 +93,7 @@ class TextStatements:
     unsure_units: list[Stated] = field(default_factory=list)
     steps: list[Stated] = field(default_factory=list)
     unsure_steps: list[Stated] = field(default_factory=list)
+    lone_steps: list[Stated] = field(default_factory=list)
     durations: list[Stated] = field(default_factory=list)
     counts: list[Stated] = field(default_factory=list)
     quantities: list[tuple[str, int]] = field(default_factory=list)
@@ -152,10 +157,17 @@ class TextStatements:
                 number = float(match["number"].lower().replace("d", "e")) or nan
                 shown = f"{match['number']} {'Hz' if is_rate else 's'}"
                 self.steps.append(_step(number, shown, place, is_rate=is_rate))
-        for match in re.finditer(rf"(?i)samp\w*{_BEHIND}{_NUMBER}", rest):
-            number = float(match["number"].lower().replace("d", "e"))
-            value = number if number < MAX_STEP else 1 / number
-            self.unsure_steps.append(Stated(value, match[0], place))
+            rest = bare.sub(" ", rest)
+        # In words of a language that is not known here, a number may be the step or the rate.
+        is_sampling = re.search(_SAMPLING, text) is not None
+        for match in _LONE_NUMBER.finditer(_COUNT.sub(" ", rest)):
+            number = float(match[0].replace(",", ".")) or nan
+            stated = Stated(number if number < MAX_STEP else 1 / number, text.strip()[:60], place)
+            if is_sampling:
+                self.unsure_steps.append(stated)
+            # The steps of most rates are decimals of few digits.
+            elif 5e-4 <= number <= 0.1 or (20 <= number <= 1000 and 1e8 % number == 0):
+                self.lone_steps.append(stated)
         # Loads, angles and drifts of an instrument or a site are no quantity of the numbers.
         name = named_quantity(rest)
         is_quantity = name.endswith(

@@ -4,27 +4,24 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from alphacut.base.stated import Stated, settled
 from alphacut.frame.records.text_file import TextFile, require_step
 
 
-@dataclass(frozen=True)
-class StatedTiming:
-    """What a line of a head, counted from 0, states of the samples; 0 where it does not.
+class StatedTiming(NamedTuple):
+    """What a line of a head, counted from 0, states of the samples.
 
-    Args:
+    Attributes:
         line: The line.
-        count: Number of samples.
-        step: Time between samples, in s.
-        duration: Time from the first to the last sample, or one step more, in s.
+        kind: "count", "step" in s, or "duration" in s, which may be one step more.
+        value: The number; 0 states nothing.
     """
 
     line: int
-    count: int = 0
-    step: float = 0.0
-    duration: float = 0.0
+    kind: str
+    value: float
 
 
 def timing_in_text(file: TextFile, first: int, last: int) -> Iterator[StatedTiming]:
@@ -39,13 +36,14 @@ def timing_in_text(file: TextFile, first: int, last: int) -> Iterator[StatedTimi
         last: Index of the line behind the last one.
     """
     number = r"(\d+\.?\d*|\.\d+)\s*s(?:ec)?\b"
-    count = r"\bnumber of points\s*[:=]?\s*(\d+)|^\s*(\d+) points of .*\bcorrected\b"
-    step = rf"\bintervals of\s*{number}|\bat\s*{number}\s*intervals\b"
+    patterns = {
+        "count": r"\bnumber of points\s*[:=]?\s*(\d+)|^\s*(\d+) points of .*\bcorrected\b",
+        "step": rf"\bintervals of\s*{number}|\bat\s*{number}\s*intervals\b",
+    }
     for line in range(first, last):
-        if match := re.search(count, file.lines[line], re.IGNORECASE):
-            yield StatedTiming(line, count=int(match[1] or match[2]))
-        if match := re.search(step, file.lines[line], re.IGNORECASE):
-            yield StatedTiming(line, step=float(match[1] or match[2]))
+        for kind, pattern in patterns.items():
+            if match := re.search(pattern, file.lines[line], re.IGNORECASE):
+                yield StatedTiming(line, kind, float(match[1] or match[2]))
 
 
 def require_timing(
@@ -58,23 +56,21 @@ def require_timing(
     Args:
         file: The file, for the message.
         line: Index of the line by which the samples are read, counted from 0.
-        stated: Count, step in s and duration in s as other lines state them; 0 stands for what a
-            line does not state.
+        stated: What other lines state.
         count: Number of samples.
         step: Time between samples, in s.
     """
     place = file.location(line)
     require_step(place, step)
-    # Heads round steps to milliseconds or less, as 1/204.8 s to .005, and durations may be those of
-    # one step more or less. A mistaken step is wrong by a quarter at least (tuned).
-    by_kind = {"count": (float(count), 1e-9), "step": (step, 0.05), "duration": (count * step, 0.0)}
+    values = {"count": count, "step": step, "duration": count * step}
+    own_line = f"line {file.line_number(line)}"
     for other in stated:
-        for kind, (value, tolerance) in by_kind.items():
-            own = float(getattr(other, kind))
-            if kind == "duration":
-                tolerance = 0.05 + 2 * step / (own or 1.0)
-            if own:
-                place_of_other = f"line {file.line_number(other.line)}"
-                found = [Stated(value, f"{value:g}", f"line {file.line_number(line)}")]
-                found.append(Stated(own, f"{own:g}", place_of_other))
-                settled(place, kind, found, tolerance=tolerance)
+        if not other.value:
+            continue
+        # Heads round steps to milliseconds or less, as 1/204.8 s to .005, and durations may be
+        # those of one step more or less. A mistaken step is wrong by a quarter at least (tuned).
+        tolerances = {"count": 1e-9, "step": 0.05, "duration": 0.05 + 2 * step / other.value}
+        line_of_other = f"line {file.line_number(other.line)}"
+        found = [Stated(values[other.kind], f"{values[other.kind]:g}", own_line)]
+        found.append(Stated(other.value, f"{other.value:g}", line_of_other))
+        settled(place, other.kind, found, tolerance=tolerances[other.kind])

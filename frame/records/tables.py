@@ -12,13 +12,13 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import lru_cache
-from math import isfinite
+from math import isclose, isfinite
 from pathlib import Path
 
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.csv_columns import NUMBER
+from alphacut.base.csv_columns import NUMBER, ColumnHead
 from alphacut.base.errors import RefusedError, cure_of, require
 from alphacut.base.stated import Stated, settled
 from alphacut.base.units import ACCELERATION, FORCE, factor_of, unit_of
@@ -55,22 +55,9 @@ class _Column:
 
     @classmethod
     def of(cls, cell: str) -> _Column:
-        """Return name and unit of a column from its cell in the head of a table.
-
-        A unit stands in brackets, "Accel. [g]" or "acc (g)", and may then be anything; or it is the
-        last word, "acc, g", "acc g", "acc_g" or "acc/g", and then must be a unit of acceleration,
-        time or force. Blanks and quotes around the cell are left out.
-        """
-        text = cell.strip(' "')
-        if match := re.fullmatch(r"(.*?)[\s,]*[\[(]\s*([^\])]*?)\s*[\])]?", text):
-            return cls(match[1].lower(), match[2])
-        text = re.sub(r"(?i)^(t|time|a|acc\w*)/", r"\1 ", text)
-        # Without brackets the last words are a unit only if they are known and whole, as in
-        # "accel_milli_g": "ground acceleration" has none.
-        for match in re.finditer(r"[\s,_]+(?=[^\W\d]|[%‰])", text):
-            if factor_of(text[match.end() :], ACCELERATION, FORCE, "s"):
-                return cls(text[: match.start()].lower(), text[match.end() :])
-        return cls(text.lower())
+        """Return name and unit of a column from its cell in the head of a table."""
+        head = ColumnHead.of(cell, ACCELERATION, FORCE, "s")
+        return cls(head.name.lower(), head.unit)
 
     @property
     def is_time(self) -> bool:
@@ -311,25 +298,9 @@ def _table_of(file: TextFile) -> _Table:
     return _Table.of(file)
 
 
-def is_table(file: TextFile, *, is_described: bool = False) -> bool:
-    """Return whether a file is a table of numbers, such as one in CSV.
-
-    Above its rows, which begin with numbers, a line names the columns, begins with times, or states
-    unit or step; or there are one or two columns, or no lines but comments, or the user describes
-    the numbers.
-
-    Args:
-        file: The file.
-        is_described: Whether the user says how to read the numbers: a channel, or step and unit.
-    """
-    table = _table_of(file)
-    is_known = is_described or bool(table.heads) or table.width < 3 or not table.titles
-    title = file.lines[table.titles[-1]] if table.titles else ""
-    is_known = is_known or re.match(r"\W*(?:time|t|date)\b", title, re.IGNORECASE) is not None
-    if table.rows and not is_known:
-        found = TextStatements.of(file, table.texts)
-        is_known = bool(found.units or found.peak_units or found.steps)
-    return bool(table.rows) and is_known
+def is_table(file: TextFile) -> bool:
+    """Return whether a file has rows that begin with numbers, as a table of CSV."""
+    return bool(_table_of(file).rows)
 
 
 def read_table(
@@ -388,9 +359,13 @@ def read_table(
     is_pair = table.width == 2 and step is None and not are_components
     has_times = not is_head and (table.has_times or is_pair)
     known_step = None
+    # A number may be that of the samples as well.
+    count = n_behind if is_head else len(table.rows)
+    unsure = [x for x in found.lone_steps if not isclose(x.value, 1 / count)]
+    unsure = found.unsure_steps or unsure
     if not has_times:
         known_step = settled(
-            place, "step", found.steps, said_step, override=override, unsure=found.unsure_steps
+            place, "step", found.steps, said_step, override=override, unsure=unsure
         )
     is_known = bool(known_step) and bool(unit or found.units or found.peak_units)
     is_series = table.width == 1 or is_head or (not table.heads and not has_times and is_known)
@@ -404,7 +379,10 @@ def read_table(
     own_unit = _unit_of(table, column, found, unit=unit, override=override)
     if own_unit is None or (known_step is None and not has_times):
         key = "unit" if own_unit is None else "step"
-        raise table.refusal(f"say records.{key}: no line states the {key}")
+        reason = f"no line states the {key} in words that are known here"
+        if key == "step" and unsure:
+            reason = f"{unsure[0].place}, {unsure[0].text}, may be of it"
+        raise table.refusal(f"say records.{key}: {reason}")
     remarks = [own_unit.remark]
     if is_series and not channel:
         samples = table.series(int(is_head))
@@ -437,8 +415,8 @@ def _require_durations(place: str, durations: Sequence[Stated], count: int, step
         steps = one.value / step.value
         is_alike = abs(steps - count) <= 1 + 0.05 * count
         cure = 'give the step of the file, or say override = ["step"]'
-        value = f"of a duration of {one}, and {count} samples"
-        require(is_alike, place, value, f"a step of {step}, as is said", cure)
+        what = f"said to have {count} samples of step {step}"
+        require(is_alike, place, what, f"a duration of {one}", cure)
 
 
 def _choose_column(table: _Table, channel: str, *, has_times: bool) -> int:
@@ -462,10 +440,9 @@ def _choose_column(table: _Table, channel: str, *, has_times: bool) -> int:
         cure += " takes records.step and records.unit"
         value = f"{table.width} columns without times"
         raise table.file.refusal(table.start, value, EXPECTED_HEAD, cure)
-    first = 1 if has_times else 0
-    names = []
-    for number, column in enumerate(table.columns[first:], first + 1):
-        names.append(tuple(filter(None, (str(number), column.name))))
+    first = int(has_times)
+    named = enumerate(table.columns[first:], first + 1)
+    names = [tuple(filter(None, (str(number), column.name))) for number, column in named]
     place = f"{table.file.location(table.start)}: {table.file.name}#COLUMN"
     return first + choose_channel(place, channel, names)
 
@@ -529,8 +506,8 @@ def _unit_of(
     elif label.unit and not factor_of(label.unit, ACCELERATION) and not found.units:
         raise table.refusal(f"{label.unit[:40]} is no unit of accelerations: mend the head")
     elif factors := [*found.factors, *of_heads.factors]:
-        cure = 'multiply the numbers by it, or say unit and override = ["unit"]'
         text = file.lines[factors[0]].strip()
+        cure = "multiply the numbers by it, and mend the line"
         raise file.refusal(factors[0], text, "a unit without a factor", cure)
     said = Stated(factor_of(unit, ACCELERATION), unit) if unit else None
     stated = [*own, *found.units] or found.peak_units
@@ -694,12 +671,10 @@ def read_force_history(path: Path) -> ForceHistory:
     file = TextFile.from_bytes(path.name, read_bytes(path))
     table = _table_of(file)
     first_row = next(iter(table.rows), 0)
-    is_headed = len(table.rows) > 1 and table.width == 2 and bool(table.heads)
-    if is_headed:
-        time, force = table.columns
-        is_force = re.match(r"\W*(?:force|load|f)\b", force.name) is not None
-        is_headed = time.is_time and factor_of(time.unit, "s") > 0 and is_force
-        is_headed = is_headed and (not force.unit or factor_of(force.unit, FORCE) > 0)
+    columns = table.columns if table.heads and len(table.rows) > 1 else []
+    is_headed = len(columns) == 2 and columns[0].is_time and factor_of(columns[0].unit, "s") > 0
+    is_headed = is_headed and re.match(r"\W*(?:force|load|f)\b", columns[1].name) is not None
+    is_headed = is_headed and (not columns[1].unit or factor_of(columns[1].unit, FORCE) > 0)
     if not is_headed:
         if table.heads:
             table.numbers(list(table.rows)[:1])  # names a row of another count of cells
@@ -707,6 +682,7 @@ def read_force_history(path: Path) -> ForceHistory:
         cure = "units of forces are N, kN, MN, kgf, lbf or kip; masses are no forces"
         value = " ".join(file.lines[k] for k in table.texts)[:80] or "without a head"
         raise file.refusal(table.start, value, allowed, cure)
+    time, force = columns
     steps = _even_steps(table, factor_of(time.unit, "s"))
     if abs(steps.first) > MAX_UNEVENNESS * steps.step:
         cure = f'write times from 0 s on, and in the case "{file.name}, from {steps.first:g} s"'

@@ -256,8 +256,8 @@ def recording_in_si(
         channel: Name of the channel in the file.
         remarks: Clauses on what is unusual in the file.
         stated: Peaks in the file's head. If each of them differs from the peak of the samples by
-            more than 5 %, or lies at another time, the recording bears a remark; if each differs by
-            more than a factor of 2, it is refused.
+            more than 5 %, the recording bears a remark; if each differs by more than a factor of 2,
+            it is refused.
 
     Returns:
         The recording, with samples in m/s².
@@ -278,7 +278,7 @@ def recording_in_si(
         raise RefusedError(location, value, f"accelerations in {ACCELERATION_UNITS}", cure)
     require_step(location, step)
     in_si = parsed.factor * samples
-    remarks += remarks_on_peak(location, in_si, stated, unit, step=step)
+    remarks += remarks_on_peak(location, in_si, stated, unit)
     return Recording(file_format, unit, step, in_si, channel, remarks)
 
 

@@ -246,10 +246,8 @@ def data_sets(content: bytes, number: int) -> Iterator[DataSet]:
         lines = [decoded(text).rstrip("\r\n") for text in inside]
         if first.strip() == str(number).encode():
             if len(lines) < head_lines:
-                # An ID line "-1" looks like the end of the data set.
-                is_id_line = file.readline().strip() not in (b"-1", b"")
-                reason = "an ID line is −1: write NONE there" if is_id_line else "it is cut off"
-                raise ValueError(f"data set {number} with {len(lines)} lines of a head; {reason}")
+                reason = "cut off, or with an ID line -1"
+                raise ValueError(f"data set {number} of {len(lines)} lines of a head, {reason}")
             yield DataSet(lines[:head_lines], lines[head_lines:])
 
 
@@ -314,15 +312,11 @@ def _parse_history(data_set: DataSet) -> _History:
 
 
 def _even_step(key: str, times: Array) -> float:
-    """Return the step in s of even times, which the format has rounded to six digits.
+    """Return the mean step in s of even times, which the format has rounded to six digits.
 
     Args:
         key: What the times are of, for messages.
         times: The times in s, shape (n,), with n ≥ 2.
-
-    Returns:
-        One over a whole number of samples in a second, if the times agree with it to all digits;
-        otherwise the mean step.
 
     Raises:
         RefusedError: A time misses its even place by more than a unit of its sixth digit and a
@@ -337,7 +331,4 @@ def _even_step(key: str, times: Array) -> float:
     # Besides, a time may miss its place by a thousandth of a step (tuned).
     is_even = step > 0 and bool((np.abs(times - even) <= last_digits + 1e-3 * step).all())
     require(is_even, key, "uneven", "even times", "resample to even steps")
-    # A whole number of samples in a second that fits all digits is the step before rounding.
-    rate = round(1 / step)
-    is_whole = rate > 0 and abs(1 / rate - step) * (len(times) - 1) <= last_digits[-1]
-    return 1 / rate if is_whole else step
+    return step

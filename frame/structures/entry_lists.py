@@ -50,11 +50,6 @@ def read_abaqus(name: str, content: bytes, *, max_rows: int) -> NamedMatrix:
     table = _table(name, lines, widths=(3, 5))
     places = whole_numbers(name, table[:, :-1])
     if places.shape[1] == 2:
-        # A file of Matrix Market whose first line is lost begins with rows, columns and entries.
-        is_head = len(table) > 1 and table[0, 2] == len(table) - 1
-        is_head = is_head and bool((places[0] >= places.max(axis=0)).all())
-        cure = "write %%MatrixMarket matrix coordinate real symmetric as the first line"
-        require(not is_head, name, "headed by sizes", "entries alone, as 3 1 -2.5e6", cure)
         array = matrix_of_entries(name, places - 1, table[:, -1], max_rows=max_rows)
         return NamedMatrix(array)
     return named_matrix(name, places.reshape(-1, 2, 2), table[:, -1], max_rows=max_rows)
@@ -181,25 +176,19 @@ def matrix_of_entries(
     require_size(name, (size, size), max_rows)
     require_free_memory(name, 10.0 * size**2, f"a matrix of {size} rows")
 
-    def place_of(row: int, column: int) -> str:
-        if names:
-            return f"[{names[row]}, {names[column]}]"
-        return f"[{row + 1}, {column + 1}]"
-
+    labels = names or tuple(map(str, range(1, size + 1)))
     rows, columns = places.T
-    counts = np.zeros((size, size), np.int8)
     flat, repeats = np.unique(rows * size + columns, return_counts=True)
-    twice = flat[repeats > 1]
-    value = (
-        f"with {repeats.max()} entries at {place_of(*divmod(int(flat[repeats.argmax()]), size))}"
-    )
+    row, column = divmod(int(flat[repeats.argmax()]), size)
+    value = f"with {repeats.max()} entries at [{labels[row]}, {labels[column]}]"
     cure = "mend the place of one, or write the matrix anew"
-    require(len(twice) == 0, name, value, "one entry at each place", cure)
+    require(bool(repeats.max() == 1), name, value, "one entry at each place", cure)
+    counts = np.zeros((size, size), np.int8)
     counts[rows, columns] = 1
-    bare = np.flatnonzero((counts | counts.T).any(axis=0) & (counts.diagonal() == 0))
-    if len(bare):
-        place = place_of(int(bare[0]), int(bare[0]))
-        raise RefusedError(name, f"without {place}", "a diagonal entry in each row in use", cure)
+    is_bare = (counts | counts.T).any(axis=0) & (counts.diagonal() == 0)
+    label = labels[int(is_bare.argmax())]
+    value = f"without [{label}, {label}]"
+    require(not is_bare.any(), name, value, "a diagonal entry in each row in use")
     array = np.zeros((size, size))
     array[rows, columns] = values
     n_single = int((counts != counts.T).sum()) // 2

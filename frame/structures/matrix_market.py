@@ -117,15 +117,13 @@ def dense_of_entries(
     Raises:
         RefusedError: An index is no whole number inside the shape.
     """
-    for axis, indices in enumerate((rows, columns)):
-        is_inside = (indices >= 0) & (indices < shape[axis]) & (indices == np.floor(indices))
-        if not is_inside.all():
-            wrong = indices[int(np.argmin(is_inside))]
-            value = f"index {wrong + 1:g} of {'rows' if axis == 0 else 'columns'}, counted from 1"
-            cure = f"the file states {shape[0]} × {shape[1]}: mend the line of sizes, or the index"
-            if wrong == -1:
-                cure = "indices that count from 0 need 1 added to each"
-            raise RefusedError(name, value, f"whole numbers from 1 to {shape[axis]}", cure)
+    places = np.stack([rows, columns])
+    is_whole = (places >= 0) & (places == np.floor(places))
+    is_inside = (is_whole & (places < np.reshape(shape, (2, 1)))).all(axis=0)
+    row, column = places[:, int(is_inside.argmin())] + 1
+    cure = f"the file states {shape[0]} × {shape[1]}: mend the line of sizes, or the entry"
+    allowed = "rows and columns inside, counted from 1"
+    require(bool(is_inside.all()), name, f"with an entry at [{row:g}, {column:g}]", allowed, cure)
     # An assignment by indices would keep the last of several entries of one place; finite-element
     # programs write one entry for each element there.
     matrix = np.zeros(shape)

@@ -126,8 +126,7 @@ def read_matrix(
 
 
 def _texts_in(path: Path, member: str) -> Iterator[tuple[str, str]]:
-    """Yield what may state a unit, with its place: comments, names, and texts beside arrays."""
-    yield path.stem.replace("_", " "), "in its name"
+    """Yield what may state a unit, with its place: comments, names and texts of arrays."""
     suffix = path.suffix.lower()
     if suffix == ".npz":
         for name in names_in_npz(path):
@@ -163,6 +162,9 @@ def _stated_factor(path: Path, member: str, quantity: str) -> float:
         place = f"{path.name}, {where_it_stands}"
         is_name = "name" in where_it_stands
         units = [one for one in mentions(line) if not is_name or (one.is_sure and not one.numbers)]
+        # A number beside a unit may be a factor, as in "to be multiplied by 1e6 (N/m)".
+        are_multiplied = r"(?i)\b(?:multipl\w*|divide\w*|factor|times)\b[^,;]*$"
+        has_factor = any(one.numbers and re.search(are_multiplied, one.before) for one in units)
         rest = without_units(line, units)
         # "mass = weight / g" is a mass.
         is_mass = re.search(r"(?i)\bmass\w*\s*=", line) is not None
@@ -178,7 +180,7 @@ def _stated_factor(path: Path, member: str, quantity: str) -> float:
             or re.search(r"(?i)scal|multipl|divi|times|factor|[a-z]/1|[x×*·]\s*\d", rest)
             is not None
         )
-        has_factor = is_of_numbers and re.search(FACTOR, rest, re.IGNORECASE) is not None
+        has_factor |= is_of_numbers and re.search(FACTOR, rest, re.IGNORECASE) is not None
         has_factor |= any(
             one.is_sure and one.is_multiple and re.search(_IN_UNITS, one.before) for one in units
         )
@@ -246,12 +248,7 @@ def read_unknowns(path: str | Path, *, name: str = "", held: bool = False) -> tu
     """
     file = path_of("path", path)
     array, names = _read_named(file, name, max_rows=MAX_ROWS)
-    cures = {
-        ".mtx": "let *MATRIX OUTPUT write FORMAT=LABELS",
-        ".sti": "keep the file .dof of the same name beside it",
-        ".mas": "keep the file .dof of the same name beside it",
-    }
-    cure = cures.get(file.suffix.lower(), "list the names in the order of the rows")
+    cure = "let *MATRIX OUTPUT write FORMAT=LABELS, or keep the .dof of a .sti or .mas beside it"
     require(bool(names), file.name, "without names of unknowns", "a file that names them", cure)
     is_free = np.asarray(array.diagonal(), float) < HELD_STIFFNESS
     return tuple(compress(names, ~is_free if held else is_free))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Sequence
-from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +20,12 @@ from alphacut.base.pictures import opened_picture
 from alphacut.base.stated import warn_of_overrides
 from alphacut.rve.image.memory import require_memory
 from alphacut.rve.image.raw import HEADS, data_of_head, read_head
-from alphacut.rve.image.spacing import require_spacing
+from alphacut.rve.image.spacing import (
+    StatedSpacing,
+    require_spacing,
+    spacing_of_resolution,
+    spacing_of_tags,
+)
 from alphacut.rve.image.stack import read_stack
 from alphacut.rve.image.white import PHOTOMETRIC, as_shown, stored_values, tags_of
 
@@ -52,18 +56,9 @@ def read_grid(path: Path, sides: Sequence[float], override: Collection[str] = ()
     """
     dimension = len(sides)
     warn_of_overrides(path.name, override)
-    take_voxel = "a volume takes cell.voxel in place of cell.pixel"
-    if dimension == 2:
-        allowed_file = "an image or an array"
-        allowed_shape = "one plane of 2 × 2 numbers or more"
-        cures = {3: take_voxel}  # by the dimension that the file has instead
-        require(not path.is_dir(), path.name, "a folder", "a picture", take_voxel)
-    else:
-        allowed_file = "a volume"
-        allowed_shape = "numbers along three axes (z, y, x), 2 × 2 × 2 or more"
-        cures = {2: "a picture takes cell.pixel in place of cell.voxel"}
-    texts = [path.stem.replace("_", " ")]
-    require_spacing(path.name, [nan] * dimension, sides, texts=texts, override=override)
+    kind = "a picture" if dimension == 2 else "a volume"
+    cure = "a picture takes cell.pixel, a volume cell.voxel"
+    require(dimension == 3 or not path.is_dir(), path.name, "a folder", "a picture", cure)
     try:
         if path.suffix.lower() == ".npy":
             # The file is mapped, not read: one too large for memory must come as far as the
@@ -76,11 +71,12 @@ def read_grid(path: Path, sides: Sequence[float], override: Collection[str] = ()
     except RefusedError:
         raise
     except Exception as error:  # readers of damaged files raise errors of many kinds
-        raise RefusedError(path.name, f"unreadable ({error})", allowed_file) from None
+        raise RefusedError(path.name, f"unreadable ({error})", kind) from None
     is_thin = min(values.shape, default=0) < 2
     is_grid = values.ndim == dimension and not is_thin and values.dtype.kind in "buif"
     what = f"{values.dtype} of shape {values.shape}"
-    require(is_grid, path.name, what, allowed_shape, cures.get(values.ndim, ""))
+    allowed = f"{kind} of real numbers, two or more along {dimension} axes"
+    require(is_grid, path.name, what, allowed, cure)
     # This comes before the numbers of a mapped array are touched.
     require_memory(values.shape)
     n_not_finite = int((~np.isfinite(values)).sum())
@@ -120,9 +116,7 @@ def _read_volume(path: Path, sides: Sequence[float], override: Collection[str]) 
         head = read_head(path, sides, override)
         require_memory(head.shape)
         return head.read()
-    cure = "save the array along (z, y, x) by numpy.save, or raw data beside a .mhd head"
-    if ending in (*SLICES, ".jpg", ".jpeg"):
-        cure = "a picture takes cell.pixel in place of cell.voxel"
+    cure = "save the array along (z, y, x) by numpy.save; a picture takes cell.pixel"
     allowed = "a TIFF stack, a folder of slices, .npy, .mhd or .nhdr"
     raise RefusedError(path.name, f"a file of kind {path.suffix or 'unknown'}", allowed, cure)
 
@@ -156,7 +150,11 @@ def _read_slices(folder: Path, sides: Sequence[float], override: Collection[str]
     missing = [k for k in range(lowest, lowest + count) if k not in by_number]
     what = f"{count} pictures, none with number {min(missing, default=lowest)}"
     require(not missing, folder.name, what, "slices with numbers that follow one another")
-    first = _read_picture(by_number[lowest], sides, override)
+    # Bruker's scanners write a list of settings beside the slices.
+    logs = [x.read_text("utf-8", "replace") for x in sorted(folder.glob("*.log")) if x.is_file()]
+    lines = "\n".join(logs).splitlines()
+    further = [line for line in lines if re.search("(?i)pixel.*size", line)]
+    first = _read_picture(by_number[lowest], sides, override, further)
     shape = (count, *first.shape)
     require_memory(shape)
     values = np.empty(shape, first.dtype)
@@ -185,17 +183,18 @@ def _numbers_in_names(files: Sequence[Path]) -> list[int]:
     numbers = [re.findall(r"\d+", file.stem) for file in files]
     for file, found in zip(files, numbers, strict=True):
         require(bool(found), file.name, "no number", "a number in the name of each slice")
-    words = {re.sub(r"\d+", "#", file.stem) for file in files}
     place = -1
-    if len(words) == 1:
+    if len({re.sub(r"\d+", "#", file.stem) for file in files}) == 1:
         # Numbers of all names at the same place, to see which place changes from slice to slice.
-        columns = list(zip(*numbers, strict=True))
-        changing = [k for k, column in enumerate(columns) if len(set(map(int, column))) > 1]
+        columns = enumerate(zip(*numbers, strict=True))
+        changing = (k for k, column in columns if len(set(map(int, column))) > 1)
         place = max(changing, default=-1)
     return [int(found[place]) for found in numbers]
 
 
-def _read_picture(path: Path, sides: Sequence[float], override: Collection[str]) -> Array:
+def _read_picture(
+    path: Path, sides: Sequence[float], override: Collection[str], further: Sequence[str] = ()
+) -> Array:
     """Return the grey values of an image file, bright large, shape (rows, columns), top row first.
 
     Args:
@@ -203,6 +202,7 @@ def _read_picture(path: Path, sides: Sequence[float], override: Collection[str])
         sides: Sides of a pixel along (y, x), in m. If they are equal, the picture may not state
             unequal ones.
         override: "voxel", where the picture states wrong ones.
+        further: Lines beside the picture that may state the sides of its pixels.
 
     Raises:
         RefusedError: The file has several pages, or colours that are not grey, or states other
@@ -218,24 +218,27 @@ def _read_picture(path: Path, sides: Sequence[float], override: Collection[str])
         cure = "save the one meant as grey values; a volume takes cell.voxel"
         is_read = (is_grey or is_colour) and frames == 1
         require(is_read, path.name, what, "one page of grey values", cure)
-        # Many programs write equal resolutions whatever the pixels are, such as 0 and 0 in a BMP.
-        # Only unequal ones say something of the pixels.
-        try:
-            dpi_x, dpi_y = map(float, picture.info.get("dpi", (1, 1)))
-        except ZeroDivisionError:  # a fraction over 0 in a TIFF: the pixels are not stated
-            dpi_x = dpi_y = 1.0
-        is_as_stated = sides[0] != sides[1] or abs(dpi_x - dpi_y) <= 0.01 * dpi_y
-        what = f"of pixels {dpi_x:g} by {dpi_y:g} per inch"
-        cure = "give cell.pixel = [width, height]"
-        require(is_as_stated, path.name, what, "square ones", cure)
+        found = _spacing_of(path, picture)
         texts = [text for text in picture.info.values() if isinstance(text, str)]
-        require_spacing(path.name, [nan, nan], sides, texts=texts, override=override)
+        found = found._replace(texts=[*texts, *found.texts, *further])
+        require_spacing(path.name, found, sides, override=override)
         require_memory((picture.height, picture.width))
         if is_colour:
             return _grey_of_colours(path.name, np.asarray(picture.convert("RGBA")))
         values = stored_values(picture)
         _require_right_sign(path.name, picture, values)
         return as_shown(path.name, values, tags_of(picture).get(PHOTOMETRIC))
+
+
+def _spacing_of(path: Path, picture: Image) -> StatedSpacing:
+    """Return what an open picture states of its pixels, in tags of TIFF or as a resolution."""
+    if tags := tags_of(picture):
+        return spacing_of_tags(tags)
+    scale = re.search(rb"sCAL\x01([\d.eE+-]+)\0([\d.eE+-]+)", path.read_bytes())
+    if picture.format == "PNG" and scale is not None:
+        return StatedSpacing([float(scale[1]), float(scale[2])], ["m", "m"])
+    x, y = picture.info.get("dpi", (1, 1))
+    return spacing_of_resolution(float(x), float(y))
 
 
 def _require_right_sign(name: str, picture: Image, values: Array) -> None:

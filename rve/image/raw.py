@@ -15,7 +15,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError, require
-from alphacut.rve.image.spacing import require_spacing, unit_in_texts
+from alphacut.rve.image.spacing import StatedSpacing, require_spacing, unit_in_texts
 
 HEADS = (".mhd", ".mha", ".nhdr", ".nrrd")
 """Endings of files with such a head."""
@@ -180,7 +180,8 @@ def read_head(path: Path, sides: Sequence[float], override: Collection[str] = ()
     if not any(units):
         ordered = [unit_in_texts(texts)] * 3
     counts = [int(sizes[axis]) for axis in order]
-    require_spacing(name, lengths, sides, ordered, texts=texts, counts=counts, override=override)
+    stated = StatedSpacing(lengths, ordered, texts)
+    require_spacing(name, stated, sides, counts=counts, override=override)
     endian = entries.value("binarydatabyteordermsb", "elementbyteordermsb", "endian")
     # NRRD asks for it beside numbers of several bytes; MetaImage means the little one without it.
     is_stated = bool(endian) or "elementtype" in entries.values or np.dtype(kind).itemsize == 1

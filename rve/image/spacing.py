@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from alphacut.base.errors import require
@@ -30,13 +30,25 @@ _AXIS = r"(?i)(?:(?:^|[\W_])[dvΔδ]?|\bd)([xyz]{1,3})[\"']?\s*[:=]*\s*$"
 _BARE_AXIS = rf"(?i)\bd?([xyz])[\"']?\s*[:=]\s*({NUMBER})(?!\s*[a-zµμ])"
 
 
+class StatedSpacing(NamedTuple):
+    """What a file states of its voxels.
+
+    Args:
+        distances: Of voxels along x, y, z, or fewer; NaN where it states none.
+        units: Units of them, empty where it states none.
+        texts: Lines that may state sides as well, as "voxel size 2.5 um".
+    """
+
+    distances: Sequence[float]
+    units: Sequence[str]
+    texts: Sequence[str] = ()
+
+
 def require_spacing(
     name: str,
-    stated: Sequence[float],
+    found: StatedSpacing,
     sides: Sequence[float],
-    units: Sequence[str] = (),
     *,
-    texts: Iterable[str] = (),
     counts: Sequence[int] = (),
     override: Collection[str] = (),
 ) -> None:
@@ -46,69 +58,65 @@ def require_spacing(
 
     Args:
         name: Name of the file, for messages.
-        stated: Distances of voxels along x, y, z that the file states; NaN where it states none.
-        sides: Sides of a voxel of the case along z, y, x, in m, positive.
-        units: Unit of each of the distances; empty where the file states none, and none at all if
-            there are no units.
-        texts: Other lines of the file, which may state sides as well, as "voxel size 2.5 um".
+        found: What the file states.
+        sides: Sides of a voxel of the case along z, y, x, or of a pixel along y, x, in m, positive.
         counts: Numbers of voxels along x, y, z, which divide extents in `texts`.
         override: "voxel", where the user says that the file is wrong.
 
     Raises:
         RefusedError: A stated distance is not above 0 and finite; a unit is unknown beside a known
             one; or sides or ratios differ by more than 1 %.
-        ValueError: The numbers of distances and sides differ.
     """
     if "voxel" in override:
         return
     # The case's sides are those of the array's axes (z, y, x), a file states x, y, z.
     expected = list(reversed(sides))
-    units = [unit.strip() for unit in units] or [""] * len(stated)
-    shown = " × ".join(f"{x:g} {u}".strip() for x, u in zip(stated, units, strict=True))
+    stated = found.distances[: len(sides)]
+    units = [unit.strip() for unit in found.units]
     known = [k for k, length in enumerate(stated) if not math.isnan(length)]
+    shown = " × ".join(f"{stated[k]:g} {units[k]}".strip() for k in known)
+    shown = f"voxels of {shown} along {', '.join('xyz'[k] for k in known)}"
     are_lengths = all(0 < stated[k] < math.inf for k in known)
-    require(are_lengths, name, f"voxels of {shown}", "spacings greater than 0, or none")
+    require(are_lengths, name, shown, "spacings greater than 0, or none")
     # Without a known unit the ratios of the sides count: of all axes in the unit of the first one.
     factors = [factor_of(unit, "m") or math.nan for unit in units]
     if all(math.isnan(factors[k]) for k in known):
         is_one = len({units[k] for k in known}) < 2
-        require(is_one, name, f"voxels of {shown}", f"units {LENGTHS}")
+        require(is_one, name, shown, f"units {LENGTHS}")
         scales = [expected[k] / stated[k] for k in known] or [1.0]
         factors = [scales[0]] * len(stated)
-        shown_sides = " : ".join(f"{side:g}" for side in expected)
-    else:
-        shown_sides = " × ".join(f"{side:g} m" for side in expected)
+    what = f"said to have voxels of {' × '.join(f'{side:g} m' for side in expected)}"
     are_alike = all(math.isclose(stated[k] * factors[k], expected[k], rel_tol=0.01) for k in known)
-    cure = "give the voxel as it is"
-    require(are_alike, name, f"voxels of {shown} along x, y, z", shown_sides, cure)
-    found = [one for text in texts for one in _lengths_in(text, counts)]
-    has_depth = any(one.axes == (2,) for one in found)
-    unsure = [one.stated for one in found if not one.axes]
-    for one in found:
+    require(are_alike, name, what, shown, "give the voxel as it is")
+    values = dict(enumerate(expected))
+    if len(expected) == VOLUME:
+        values[VOLUME] = math.prod(expected)
+    lengths = [one for text in found.texts for one in _lengths_in(text, counts)]
+    has_depth = any(one.axes == (2,) for one in lengths)
+    for one in lengths:
         # Beside the distance of slices the side of a voxel is that within a slice.
         axes = one.axes[:2] if has_depth and len(one.axes) == 3 else one.axes
         if len(axes) == 3 and len({stated[k] for k in known}) > 1:
             axes = (min(known, key=stated.__getitem__),)  # the side to which the ratios belong
-        for axis in axes:
-            if axis < len(expected):
-                said = Stated(expected[axis], f"of {expected[axis]:g} m along {'xyz'[axis]}")
-                settled(name, "voxel", [one.stated], said, tolerance=0.01)
-            elif axis == VOLUME == len(expected):
-                said = Stated(math.prod(expected), f"of {math.prod(expected):g} m^3")
-                settled(name, "voxel", [one.stated], said, tolerance=0.03)
-    if not unsure or known or len(unsure) < len(found):
+        for axis in values.keys() & set(axes):
+            place = "m^3" if axis == VOLUME else f"m along {'xyz'[axis]}"
+            said = Stated(values[axis], f"of {values[axis]:g} {place}")
+            settled(name, "voxel", [one.stated], said, tolerance=0.03 if axis == VOLUME else 0.01)
+    if known or not lengths or any(one.axes for one in lengths):
         return
     # Lengths of which no word says what they are must be those of the case, or of the volume.
     extents = [side * count for side, count in zip(expected, counts, strict=False)]
-    for own in unsure:
-        is_like = any(math.isclose(own.value, x, rel_tol=0.01) for x in (*expected, *extents))
-        cure = 'say override = ["voxel"] if that is something else'
-        require(is_like, name, f"of a length of {own}", f"voxels of {shown_sides}", cure)
-    for axis, side in enumerate(expected):
-        said = Stated(side, f"of {side:g} m along {'xyz'[axis]}")
-        whole = extents[axis] if extents else math.nan
-        if not any(math.isclose(x.value, whole, rel_tol=0.01) for x in unsure):
-            settled(name, "voxel", [], said, tolerance=0.01, unsure=unsure)
+    own = [one.stated.value for one in lengths]
+    is_like = all(_is_among(x, (*expected, *extents)) for x in own)
+    is_like &= all(_is_among(x, own) for x in expected) or any(_is_among(x, own) for x in extents)
+    shown = " and ".join(str(one.stated) for one in lengths)
+    cure = 'say override = ["voxel"] if that is something else'
+    require(is_like, name, what, f"a length of {shown}", cure)
+
+
+def _is_among(length: float, others: Iterable[float]) -> bool:
+    """Return whether a length is one of some others, to 1 %."""
+    return any(math.isclose(length, other, rel_tol=0.01) for other in others)
 
 
 class _Length(NamedTuple):
@@ -199,7 +207,61 @@ def unit_in_texts(texts: Iterable[str]) -> str:
     return ""
 
 
-def ome_spacing(head: str) -> tuple[list[float], list[str]]:
+def spacing_of_resolution(x: float, y: float) -> StatedSpacing:
+    """Return what resolutions, in pixels per inch along x and y, state of the pixels.
+
+    Programs write those of printers, 72 to 2400 in whole numbers, whatever the pixels are: of these
+    the ratio alone counts, if it is not 1. Round numbers in a metre are written on purpose.
+    """
+    inches = [1 / number if 0 < number < math.inf else math.nan for number in (x, y)]
+    if x > 2:
+        half_thousands = x / 12.7  # in a metre
+        is_round = abs(half_thousands - round(half_thousands)) < 1e-3
+        if x > 2400 or is_round or abs(x - round(x)) > 0.02:
+            return StatedSpacing(inches, ["in", "in"])
+    return StatedSpacing(inches if abs(x - y) > 0.01 * y else [], ["", ""])
+
+
+def spacing_of_tags(tags: Mapping[int, object]) -> StatedSpacing:
+    """Return what a page of TIFF states in its tags: of OME, ImageJ, microscopes or TIFF itself.
+
+    TIFF itself has no distance along z.
+
+    Args:
+        tags: Values of the tags by their numbers.
+    """
+    description = str(tags.get(270, ""))
+    texts = [str(tags.get(code, "")) for code in (305, 315)]  # of the program and the author
+    # Lists of settings of Zeiss and FEI, whose lengths without a unit are in m.
+    settings = "\n".join(str(tags.get(code, "")) for code in (34118, 34680, 34682))
+    size = rf"(?i)pixel ?(?:size|(width)|height)[^\w.\n]+({NUMBER})[ ',]*([a-zµ]*)"
+    for match in re.finditer(size, settings):
+        unit = match[3] if factor_of(match[3], "m") else "m"
+        axis = "x = " if match[1] else ""
+        texts.append(f"pixel size {axis}{match[2]} {unit}")
+    if "<OME" in description:
+        return _ome_spacing(description)._replace(texts=texts)
+    x, y = (_reciprocal(tags.get(code)) for code in (282, 283))
+    head = dict(re.findall(r"(?m)^(\w+)=(.*?)\s*$", description))
+    if "ImageJ" in head:
+        # ImageJ writes the units of y and z where they differ from that of x.
+        keys = ("unit", "yunit", "zunit")
+        units = [head.get(key, head.get("unit", "")).replace("\\u00B5", "µ") for key in keys]
+        if units[0].lower() in ("", "pixel", "pixels", "null"):
+            units = [""] * 3
+            # Without a unit of length ImageJ's spacing is in pixels.
+            if math.isnan(x) or x == y == 1:
+                x = y = 1.0
+        return StatedSpacing([x, y, _number(head.get("spacing", ""))], units, texts)
+    texts.append(description)
+    unit = str(tags.get(296, 2))
+    if unit == "3":  # centimetres, which are written on purpose; inches are often a printer's
+        return StatedSpacing([x, y], ["cm", "cm"], texts)
+    found = spacing_of_resolution(1 / x, 1 / y) if unit == "2" else StatedSpacing([x, y], ["", ""])
+    return found._replace(texts=texts)
+
+
+def _ome_spacing(head: str) -> StatedSpacing:
     """Return the distances of voxels along x, y, z in a head of OME-XML, and their units.
 
     Args:
@@ -209,17 +271,22 @@ def ome_spacing(head: str) -> tuple[list[float], list[str]]:
         NaN for a distance that is missing or no number. If one unit is stated, those that are not
         are µm, as OME says; else all are empty.
     """
-    sizes = [re.search(rf'\bPhysicalSize{axis}\s*=\s*"([^"]*)"', head) for axis in "XYZ"]
-    found = [re.search(rf'\bPhysicalSize{axis}Unit\s*=\s*"([^"]*)"', head) for axis in "XYZ"]
-    default = "µm" if any(found) else ""
-    micro = re.compile("&#(?:181|xB5);")
-    units = [micro.sub("µ", unit[1]) if unit else default for unit in found]
-    return [_length(size) for size in sizes], units
+    attributes = dict(re.findall(r'\bPhysicalSize(\w+)\s*=\s*"([^"]*)"', head))
+    default = "µm" if any(len(key) > 1 for key in attributes) else ""
+    units = [attributes.get(f"{axis}Unit", default) for axis in "XYZ"]
+    units = [re.sub("&#(?:181|xB5);", "µ", unit) for unit in units]
+    return StatedSpacing([_number(attributes.get(axis, "")) for axis in "XYZ"], units)
 
 
-def _length(match: re.Match[str] | None) -> float:
-    """Return the number in the first group of a match, nan where there is none."""
+def _number(text: str) -> float:
+    """Return the number that a text is, nan where it is none."""
     try:
-        return math.nan if match is None else float(match[1])
+        return float(text)
     except ValueError:
         return math.nan
+
+
+def _reciprocal(value: object) -> float:
+    """Return 1 over the value of a tag, a number or a fraction; nan without one above 0."""
+    numbers = [*map(float, re.findall(NUMBER, str(value))), 1.0]
+    return numbers[1] / numbers[0] if len(numbers) > 1 and numbers[0] > 0 else math.nan

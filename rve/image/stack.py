@@ -16,7 +16,7 @@ from alphacut.base.extras import extra_named
 from alphacut.base.memory import require_free_memory
 from alphacut.base.pictures import LZW_RATIO, opened_picture
 from alphacut.rve.image.memory import require_memory
-from alphacut.rve.image.spacing import ome_spacing, require_spacing
+from alphacut.rve.image.spacing import require_spacing, spacing_of_tags
 from alphacut.rve.image.white import as_shown, stored_values
 
 if TYPE_CHECKING:
@@ -104,10 +104,9 @@ def _read_file(
     file_size = path.stat().st_size
     max_bytes = _max_bytes_per_byte(compression) * file_size
     require(n_bytes <= max_bytes, name, what, f"what {file_size} bytes can hold")
-    spacing, units = _spacing(file)
-    texts = [str((file.imagej_metadata or {}).get("Info", ""))]
-    texts += [] if file.is_ome else [file.pages.first.description]
-    require_spacing(name, spacing, sides, units, texts=texts, override=override)
+    found = spacing_of_tags({int(tag.code): tag.value for tag in file.pages.first.tags})
+    texts = [*found.texts, str((file.imagej_metadata or {}).get("Info", ""))]
+    require_spacing(name, found._replace(texts=texts), sides, override=override)
 
     if compression == 5:  # LZW, which tifffile does not unpack without another package
         values = _pages_by_pillow(path, first.dtype)
@@ -162,48 +161,3 @@ def _pages_by_pillow(path: Path, dtype: np.dtype[Any]) -> Array:
             picture.seek(number)
             pages.append(stored_values(picture))
     return np.stack(pages).astype(dtype)
-
-
-def _spacing(file: TiffFile) -> tuple[list[float], list[str]]:
-    """Return the distances of voxels along x, y, z in heads of OME, ImageJ or TIFF, with units.
-
-    NaN stands where no head states a distance, and an empty unit where none states one. TIFF itself
-    has no distance along z, and its resolutions are mostly those of a printer.
-
-    Args:
-        file: The open file.
-
-    Raises:
-        ValueError: ImageJ's spacing is no number.
-    """
-    if file.is_ome and file.ome_metadata:
-        return ome_spacing(file.ome_metadata)
-    x = _pixel_side(file, "XResolution")
-    y = _pixel_side(file, "YResolution")
-    entry = file.pages.first.tags.get("ResolutionUnit")
-    # Per centimetre (3) is written on purpose; per inch is what programs write for printers.
-    if entry is not None and int(entry.value) == 3 and not file.imagej_metadata:
-        return [x, y, math.nan], ["cm", "cm", ""]
-    head = file.imagej_metadata or {}
-    unit = str(head.get("unit", "")).replace("\\u00B5", "µ")
-    is_pixel = unit.lower() in ("", "pixel", "pixels", "null")
-    units = [""] * 3
-    if not is_pixel:  # ImageJ writes the units of y and z where they differ from that of x
-        others = [str(head.get(key, unit)).replace("\\u00B5", "µ") for key in ("yunit", "zunit")]
-        units = [unit, *others]
-    if "spacing" not in head:
-        return [x, y, math.nan], units
-    # Without a unit of length ImageJ's spacing is in pixels.
-    if is_pixel and (math.isnan(x) or x == y == 1):
-        x = 1.0
-        y = 1.0
-    return [x, y, float(head["spacing"])], units
-
-
-def _pixel_side(file: TiffFile, tag: str) -> float:
-    """Return the side of a pixel by a tag of resolution, in any unit; nan where there is none."""
-    entry = file.pages.first.tags.get(tag)
-    if entry is None or min(entry.value) <= 0:
-        return math.nan
-    count, length = entry.value
-    return float(length / count)

@@ -19,6 +19,7 @@ from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.extras import MissingLibraryError
 from alphacut.base.memory import require_text
+from alphacut.base.units import mentions
 from alphacut.rve.cell.lattice import SQUARE, Lattice
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import grid_of
@@ -67,6 +68,9 @@ def read_grid(path: Path | str, theta: tuple[float, float] = (0.0, 1.0)) -> Pris
         cure = error.cure or "write it anew by Gmsh"
         raise RefusedError("mesh.file", f"{path}, {error.value}", MESH_FILES, cure) from None
     is_plane = mesh.dimension == SURFACE
+    for comment in re.findall(rb"(?s)\$Comments(.*?)\$EndComments", content):
+        text = comment.decode("utf-8", "replace")
+        _require_one_unit(f"mesh.file, {path}", text, is_plane=is_plane)
     prisms = read_plane(mesh).prisms(theta) if is_plane else read_prisms(mesh)
     return checked_grid(prisms)
 
@@ -97,10 +101,10 @@ def checked_grid(prisms: Prisms) -> PrismGrid:
 
 
 def mesh_content(path: Path | str) -> bytes:
-    """Return the bytes of a file in Gmsh's format MSH from its section $MeshFormat on.
+    """Return the bytes of a file in Gmsh's format MSH.
 
-    A file that begins otherwise may be a script of Gmsh, and is refused. Sections $Comments before
-    $MeshFormat are left out. What follows $MeshFormat is not checked.
+    A file that begins neither with $MeshFormat nor with sections $Comments before it may be a
+    script of Gmsh, and is refused. What follows $MeshFormat is not checked.
 
     Args:
         path: The file, text or binary; its name may have any ending.
@@ -115,13 +119,32 @@ def mesh_content(path: Path | str) -> bytes:
     except OSError as error:
         raise RefusedError("mesh.file", path, MESH_FILES, error.strerror or str(error)) from None
     # A section of comments that does not end leaves nothing, which is refused below.
-    while content.startswith(b"$Comments"):
-        _, _, content = content.partition(b"$EndComments")
-        content = content.lstrip()
-    is_mesh = re.match(rb"\$MeshFormat\s", content) is not None
+    rest = content
+    while rest.startswith(b"$Comments"):
+        _, _, rest = rest.partition(b"$EndComments")
+        rest = rest.lstrip()
+    is_mesh = re.match(rb"\$MeshFormat\s", rest) is not None
     cure = 'write it by gmsh.write("NAME.msh") or `gmsh -save`; a .geo script is no mesh'
     require(is_mesh, "mesh.file", f"{path}, without $MeshFormat at its start", MESH_FILES, cure)
     return content
+
+
+def _require_one_unit(name: str, comment: str, *, is_plane: bool) -> None:
+    """Raise RefusedError where a comment states two units, or of prisms that z is a length."""
+    units: dict[float, str] = {}
+    for line in re.split(r"[\n;]", comment):
+        for one in mentions(line):
+            is_of_axes = re.search(r"(?i)\b(?:in|units?(?:\s+of)?)\W*$", one.before) is not None
+            if one.dimension == "m" and (is_of_axes or not one.numbers):
+                units[(one.values or (one.unit.factor,))[0]] = one.shown
+                is_theta = re.search(r"(?i)theta|θ|random", line) is not None
+                has_z = re.search(r"(?i)\bz\b", one.before) is not None
+                allowed = "the random number θ along z"
+                is_right = is_plane or is_theta or not has_z
+                require(is_right, name, f"of z in {one.shown}, a length", allowed)
+    cure = "scale x and y to one unit, and mend the comment"
+    shown = " and ".join(units.values())
+    require(len(units) < 2, name, f"of lengths in {shown}", "one unit of x and y", cure)
 
 
 def read_prisms(mesh: MshFile) -> Prisms:

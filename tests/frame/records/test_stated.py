@@ -60,10 +60,9 @@ def test_unit_and_step_above_the_columns_are_taken_and_compared(
     assert not record.remarks
     for said in ({"unit": "g"}, {"step": 0.005}, {"unit": "mg", "step": 0.01}):
         key = next(iter(said))
-        with pytest.raises(RefusedError, match=f"of {key} ") as caught:
+        with pytest.raises(RefusedError, match=f"said to be of {key} ") as caught:
             read_record(path, channel=channel, **said)
         assert "(line" in str(caught.value) or "(by its times)" in str(caught.value)
-        assert "as is said" in str(caught.value)
         other = read_record(path, channel=channel, override=[key], **said)
         assert any("is overridden by" in remark for remark in other.remarks)
     assert read_record(path, channel=channel, unit="g", override=["unit"]).samples == (
@@ -77,7 +76,7 @@ def test_a_row_of_count_and_step_above_as_many_numbers_is_a_head(tmp_path):
         read_record(path)
     record = read_record(path, unit="g")
     assert (record.step, len(record.samples)) == (0.01, 60)
-    with pytest.raises(RefusedError, match=r"of step 0\.0100 s \(line 2\)"):
+    with pytest.raises(RefusedError, match=r"allowed: step 0\.0100 s \(line 2\)"):
         read_record(path, unit="g", step=0.02)
 
 
@@ -93,7 +92,7 @@ def test_a_row_of_count_and_step_above_as_many_numbers_is_a_head(tmp_path):
             "this is a velocity",
         ),
         ("# motion in units of cm/s\ntime [s],v\n", TIMED, "its column is a velocity by its unit"),
-        ("# values are in mm/s^2\n# acceleration, gal\ntime [s],a\n", TIMED, "of unit mm/s\\^2"),
+        ("# values are in mm/s^2\n# acceleration, gal\ntime [s],a\n", TIMED, "unit mm/s\\^2"),
     ],
 )
 def test_factors_other_quantities_and_two_units_are_refused(tmp_path, head, layout, words, unit):
@@ -299,6 +298,26 @@ def test_a_step_that_is_said_is_compared_with_times_of_unknown_meaning(tmp_path,
         with pytest.raises(RefusedError, match=r'override = \["step"\]'):
             read_record(path, step=2 * step)
         assert read_record(path, step=2 * step, override=["step"]).step == 2 * step
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "# Zaaktempo: 200 odczytow na sekunde",
+        "# náhodný krok vzorkování 0,005 sekundy",
+        "# Samplingfrekvens (prøver per sekund): 200",
+        "# Frekvencia vzorkovania: 200 vzoriek/s",
+    ],
+)
+def test_a_number_in_words_of_other_languages_is_named_and_compared(tmp_path, line):
+    path = saved(tmp_path, f"# Stanica 12, 2026-01-30\n{line}\n# 60 hodnot\n# gal\n", COLUMN)
+    with pytest.raises(RefusedError, match=r"say records\.step: line 2, # "):
+        read_record(path)
+    assert read_record(path, step=0.005).step == 0.005
+    for step in (0.01, 0.0025):
+        with pytest.raises(RefusedError, match=r'override = \["step"\]'):
+            read_record(path, step=step)
+        assert read_record(path, step=step, override=["step"]).step == step
 
 
 def test_a_unit_that_is_said_is_compared_with_a_letter_that_may_be_one(tmp_path):

@@ -267,6 +267,11 @@ def test_an_archive_that_unpacks_to_more_than_memory_is_refused(tmp_path, monkey
         ("mass = weight/9.81, t", None),
         ("loads in t/m", None),
         ("E=30 GPa, h=3 m, density 7850 kg/m3, kN", 1e3),
+        ("multiply by 1e3 for N/m", None),
+        ("stiffness, to be multiplied with 1e6 kN/m", None),
+        ("multiply each of the numbers by 9.81", None),
+        ("N/m, x 10^5", None),
+        ("displacements in m, rotations in rad, forces in kN, moments in kN*m", 1e3),
     ],
 )
 @pytest.mark.parametrize("name", ["k.csv", "k.mtx", "job.mtx"])
@@ -286,15 +291,19 @@ def test_units_in_comments_are_turned_to_si_or_refused(tmp_path, name, comment, 
         assert read_matrix(path) == pytest.approx(factor * np.array(matrix))
 
 
-def test_units_in_names_count_and_tell_the_quantity(tmp_path):
+def test_units_tell_the_quantity_and_names_of_files_state_none(tmp_path):
     matrix = np.array([[2.0, -1.0], [-1.0, 2.0]])
     np.save(tmp_path / "K_kN_per_m.npy", matrix)
+    (tmp_path / "frame MN.csv").write_text(
+        "# translations in kN/m, rotations in kN m\n2,-1\n-1,2\n"
+    )
     np.savez(tmp_path / "m.npz", M_tonne=matrix)
     np.savez(tmp_path / "n.npz", k=matrix, unit="MN/m")
     (tmp_path / "k.csv").write_text("# damping, kN s/m\n2,-1\n-1,2\n")
     (tmp_path / "s.csv").write_text("# units: kN, m\n2,-1\n-1,2\n")
     cases = {
-        "K_kN_per_m.npy": (1e3, {"stiffness"}),
+        "K_kN_per_m.npy": (1, {"mass", "stiffness", "damping"}),
+        "frame MN.csv": (1e3, {"stiffness"}),
         "m.npz": (1e3, {"mass"}),
         "n.npz": (1e6, {"stiffness"}),
         "k.csv": (1e3, {"damping"}),

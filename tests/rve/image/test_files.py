@@ -2,6 +2,7 @@
 
 import gzip
 import itertools
+import struct
 import subprocess
 import sys
 import zlib
@@ -164,7 +165,7 @@ def test_files_that_are_no_volume_of_numbers_are_refused(tmp_path, name, content
         ("encoding: hex", "raw or gzip"),
         ("spacings: 1 -1 1", "greater than 0"),
         ("spacings: 1 inf 1", "finite"),
-        ("spacings: 1 nan 1.1", "1 × nan × 1.1 along"),
+        ("spacings: 1 nan 1.1", "1 × 1.1 along x, z"),
         ("space directions: (1,1,0) (1,-1,0) (0,0,1)", "along x, y and z"),
         ("space directions: (1,0,0) (1,0,0) (0,0,1)", "along x, y and z"),
         ("space directions: (0,0,3) (0,1,0) (1,0,0)", "1 × 1 × 3 along"),
@@ -335,7 +336,7 @@ def test_spacing_in_heads_of_tiff_is_that_of_the_case(tmp_path, rng, name):
     stack(tmp_path / file, values, **options)
     right = RIGHT.get(name, (5, 1, 1))
     assert np.array_equal(voxels_of(tmp_path / file, right), values)
-    with pytest.raises(RefusedError, match=r"voxels of .* along x, y, z"):
+    with pytest.raises(RefusedError, match=r"voxels of .* along x, y"):
         voxels_of(tmp_path / file)
 
 
@@ -418,7 +419,7 @@ NM = 1e-9
 
 def test_units_of_single_axes_are_compared_and_may_be_overridden(tmp_path, rng):
     values = rng.integers(0, 250, SHAPE).astype("u1")
-    head = {"axes": "ZYX", "spacing": 0.025, "unit": "nm", "zunit": "\\u00B5m"}
+    head = {"axes": "ZYX", "unit": "nm", "zunit": "\\u00B5m", "spacing": 0.025}
     path = tmp_path / "a.tif"
     stack(path, values, imagej=True, resolution=(1 / 16.5, 1 / 16.5), metadata=head)
     assert np.array_equal(voxels_of(path, (25 * NM, 16.5 * NM, 16.5 * NM)), values)
@@ -549,9 +550,8 @@ def test_an_order_of_bytes_that_nrrd_does_not_state_is_asked_for(tmp_path, rng):
     assert np.array_equal(voxels_of(tmp_path / "a.nrrd"), values)
 
 
-def test_names_texts_and_resolutions_of_pictures_state_sides(tmp_path, rng):
+def test_texts_and_resolutions_of_pictures_state_sides(tmp_path, rng):
     values = rng.integers(0, 250, SHAPE).astype("u1")
-    np.save(tmp_path / "scan_2.5um.npy", values)
     options = {"metadata": {"axes": "ZYX"}, "photometric": "minisblack"}
     stack(tmp_path / "a.tif", values, resolution=(4000, 4000), resolutionunit=3, **options)
     (tmp_path / "slices").mkdir()
@@ -559,8 +559,85 @@ def test_names_texts_and_resolutions_of_pictures_state_sides(tmp_path, rng):
         head = PngInfo()
         head.add_text("Comment", "Voxelgroesse 2,5 Mikrometer")
         Image.fromarray(page).save(tmp_path / "slices" / f"{k}.png", pnginfo=head)
-    for name in ("scan_2.5um.npy", "a.tif", "slices"):
+    for name in ("a.tif", "slices"):
         side = 2.5e-6
         assert np.array_equal(voxels_of(tmp_path / name, (side, side, side)), values)
         with pytest.raises(RefusedError):
             voxels_of(tmp_path / name, (side, 3 * side, side))
+
+
+ZEISS = "AP_MAG\r\nMag = 2.00 K X\r\nAP_IMAGE_PIXEL_SIZE\r\nImage Pixel Size = 12.5 nm\r\n"
+FEI = "[EScan]\r\nPixelWidth=1.25e-008\r\nPixelHeight=1.25e-008\r\n"
+OME = {"axes": "YX", "PhysicalSizeX": 12.5, "PhysicalSizeXUnit": "nm"}
+STATED = {
+    "phys.png": 20e-6,
+    "cm.tif": 2e-6,
+    "inch.tif": 10e-6,
+    "ij.tif": 4e-3,
+    "b.ome.tif": 12.5 * NM,
+    "zeiss.tif": 12.5 * NM,
+    "fei.tif": 12.5 * NM,
+    "artist.tif": 3e-6,
+    "scale.png": 7e-6,
+}
+"""Side of a pixel that each picture below states, in m."""
+
+
+def write_picture(path, page):
+    grey = {"photometric": "minisblack", "metadata": None}
+    options = {
+        "cm.tif": {**grey, "resolution": (5000, 5000), "resolutionunit": 3},
+        "inch.tif": {**grey, "resolution": (2540, 2540), "resolutionunit": 2},
+        "ij.tif": {"imagej": True, "resolution": (0.25, 0.25), "metadata": {"unit": "mm"}},
+        "b.ome.tif": {"metadata": OME | {"PhysicalSizeY": 12.5, "PhysicalSizeYUnit": "nm"}},
+        "zeiss.tif": {**grey, "extratags": [(34118, 2, len(ZEISS), ZEISS, True)]},
+        "fei.tif": {**grey, "extratags": [(34682, 2, len(FEI), FEI, True)]},
+        "artist.tif": {**grey, "extratags": [(315, 2, 16, "pixel size 3 um", True)]},
+    }
+    if path.suffix == ".tif":
+        tifffile.imwrite(path, page, **options[path.name])
+    else:
+        dpi = (1270, 1270) if path.name == "phys.png" else (300, 300)
+        Image.fromarray(page).save(path, dpi=dpi)
+    if path.name == "scale.png":
+        chunk = b"sCAL\x017e-6\0" + b"7e-6"
+        mark = struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
+        content = path.read_bytes()
+        path.write_bytes(content[:33] + mark + content[33:])
+
+
+@pytest.mark.parametrize("name", STATED)
+@pytest.mark.parametrize("kind", ["picture", "slices"])
+def test_pixels_that_a_picture_or_its_slices_state_are_those_of_the_case(tmp_path, rng, name, kind):
+    page = rng.integers(0, 250, (8, 8)).astype("u1")
+    side = STATED[name]
+    write_picture(tmp_path / name, page)
+    path = tmp_path / name
+    if kind == "slices":
+        path = tmp_path / "slices"
+        path.mkdir()
+        for k in range(2):
+            (path / f"{k}{(tmp_path / name).suffix}").write_bytes((tmp_path / name).read_bytes())
+    dimension = 2 if kind == "picture" else 3
+    read_image(path, spacing=(side,) * dimension)
+    for factor in (1.1, 2, 1000):
+        with pytest.raises(RefusedError):
+            read_image(path, spacing=(factor * side,) * dimension)
+    if kind == "picture":
+        with pytest.raises(RefusedError):
+            read_image(path, spacing=(side, 2 * side))
+
+
+def test_resolutions_of_printers_state_nothing_and_logs_beside_slices_do(tmp_path, rng):
+    page = rng.integers(0, 250, (8, 8)).astype("u1")
+    for dpi in (72, 96, 130, 300, 1200):
+        Image.fromarray(page).save(tmp_path / "a.png", dpi=(dpi, dpi))
+        read_image(tmp_path / "a.png", spacing=(3e-6, 4e-6))
+    (tmp_path / "b").mkdir()
+    for k in range(2):
+        Image.fromarray(page).save(tmp_path / "b" / f"rec{k:04}.bmp")
+    log = "[Acquisition]\nCamera Pixel Size (um)= 9.00\nImage Pixel Size (um)= 3.25\n"
+    (tmp_path / "b" / "rec.log").write_text(log)
+    read_image(tmp_path / "b", spacing=3.25e-6)
+    with pytest.raises(RefusedError, match=r"3\.25 um"):
+        read_image(tmp_path / "b", spacing=9e-6)

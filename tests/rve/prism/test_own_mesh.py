@@ -399,6 +399,26 @@ def test_gmsh_is_handed_the_mesh_alone(tmp_path):
     assert not made.exists()
 
 
+@pytest.mark.parametrize(
+    ("comment", "match"),
+    [
+        ("lengths along x in um\nlengths along y in mm", "um and mm"),
+        ("x in cm; y in units of 5 cm", "of lengths in cm and 5 cm"),
+        ("A slab. All of x, y, z in mm", "of z in mm"),
+        ("x, y in mm; cell of 20 mm with fibres of 5 um; z is theta", ""),
+    ],
+)
+def test_comments_that_contradict_the_mesh_are_refused(tmp_path, comment, match):
+    path = tmp_path / "cell.msh"
+    mesh = (MESHES / "paper-coarse.msh").read_bytes()
+    path.write_bytes(f"$Comments\n{comment}\n$EndComments\n".encode() + mesh)
+    if not match:
+        assert grid_of(path).names == grid_of(MESHES / "paper-coarse.msh").names
+        return
+    with pytest.raises(RefusedError, match=match):
+        grid_of(path)
+
+
 @pytest.mark.parametrize("name", ["paper-coarse.msh", "ring.msh"])
 @pytest.mark.parametrize(("version", "is_binary"), [(2.2, 0), (2.2, 1), (4.1, 0), (4.1, 1)])
 def test_each_version_of_msh_is_read_as_gmsh_reads_it(tmp_path, gmsh, name, version, is_binary):
