@@ -166,45 +166,56 @@ def show_corners(ground: Accelerogram) -> None:
 def random_cases(
     rng: np.random.Generator,
     draw: Callable[[np.random.Generator], Case],
-    gap: float,
-    count: int,
-    motions: int,
+    options: argparse.Namespace,
 ) -> None:
     """Print a line for each random case: its gap, its time, and what motions exceed it by."""
     ratios = []
     refused = 0
-    for number in range(count):
+    limits = {"boxes": 1000, "seconds": options.seconds}
+    for number in range(options.cases):
         frame, inputs, duration = draw(rng)
         label = f"{number}: {frame.floors} floors, {', '.join(inputs)}"
         start = time.process_time()
         try:
-            found = prove(frame, inputs, gap, duration=duration, boxes=1000)
+            found = prove(frame, inputs, options.gap, duration=duration, **limits)
         except UnprovedError as error:
             refused += 1
             print(f"{label}: refused: {error}", flush=True)
             continue
         seconds = time.process_time() - start
-        outside = excess(frame, found, rng, motions)
+        outside = excess(frame, found, rng, options.motions)
         both = peaks(found, frame.outputs[:2]).values()
         ratio = max(float(x.proved[0] / x.reached[0]) for x in both)
         ratios.append(ratio)
-        print(
-            f"{label}: proved over reached {ratio:.5f}, {found.facts['boxes']:.0f} boxes,"
-            f" {seconds:.1f} s, largest excess of {motions} motions {outside:.1e} of the peak",
-            flush=True,
-        )
+        effort = f"{found.facts['boxes']:.0f} boxes, {seconds:.1f} s"
+        largest = f"largest excess of {options.motions} motions {outside:.1e} of the peak"
+        print(f"{label}: proved over reached {ratio:.5f}, {effort}, {largest}", flush=True)
         assert outside <= 0, "a motion lies outside"
-    print(f"median of proved over reached {np.median(ratios):.5f}; {refused} of {count} refused")
+    of_all = f"{refused} of {options.cases} refused"
+    print(f"median of proved over reached {np.median(ratios):.5f}; {of_all}")
 
 
 def prove(
-    frame: StoreyFrame, inputs: dict[str, Interval], gap: float, duration: float, boxes: float
+    frame: StoreyFrame,
+    inputs: dict[str, Interval],
+    gap: float,
+    *,
+    duration: float,
+    boxes: float,
+    seconds: float = np.inf,
 ) -> Envelope:
-    """The guaranteed envelope of one cut."""
+    """The guaranteed envelope of one cut, within so much processor time."""
+    until = time.process_time() + seconds
     return envelope(
         frame, inputs, "proof", gap=gap, duration=duration, step=STEP, alpha=[0], boxes=boxes,
-        progress=False,
+        progress=lambda _: _spend(until),
     )  # fmt: skip
+
+
+def _spend(until: float) -> None:
+    """Refuse what takes longer than up to a processor time in s."""
+    if time.process_time() > until:
+        raise UnprovedError("more processor time than --seconds", "take narrower inputs")
 
 
 def excess(frame: StoreyFrame, found: Envelope, rng: np.random.Generator, motions: int) -> float:
@@ -259,6 +270,7 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=40, help="random cases")
     parser.add_argument("--motions", type=int, default=5000, help="motions of each")
     parser.add_argument("--gap", type=float, default=0.01, help="wanted gap of peaks")
+    parser.add_argument("--seconds", type=float, default=np.inf, help="most of each case")
     parser.add_argument("--buildings", action="store_true", help="draw isolated buildings")
     parser.add_argument("--el-centro", action="store_true", help="El Centro alone")
     parser.add_argument("--corners", action="store_true", help="what corners miss")
@@ -273,8 +285,7 @@ def main() -> None:
         return
     print(f"--seed {options.seed}")
     draw = random_building if options.buildings else random_storey
-    rng = np.random.default_rng(options.seed)
-    random_cases(rng, draw, options.gap, options.cases, options.motions)
+    random_cases(np.random.default_rng(options.seed), draw, options)
 
 
 if __name__ == "__main__":

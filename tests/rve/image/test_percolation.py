@@ -241,8 +241,11 @@ def test_a_channel_and_layers_are_exact(dimension, rng):
 
 @pytest.mark.parametrize(("young", "porosity"), [((1.0,), 0.4), ((1.0, 10.0), 0.5)])
 def test_lower_bounds_of_porous_volumes_rise_with_the_grid_below_the_upper_ones(
-    young, porosity, rng
+    young, porosity, rng, monkeypatch
 ):
+    # A few steps come near the best stresses, which alone rise for every draw.
+    monkeypatch.setattr(equilibrium, "MAX_STEPS", 300)
+    monkeypatch.setattr(equilibrium, "LEAST_GAIN", 1e-8)
     solid = porous(rng, 6, porosity=porosity, length=1.2)
     phase = solid * (1 + (len(young) - 1) * porous(rng, 6, porosity=0.5, length=1.2))
     nu = rng.uniform(-0.5, 0.45)
@@ -250,9 +253,9 @@ def test_lower_bounds_of_porous_volumes_rise_with_the_grid_below_the_upper_ones(
         solve_image(*moduli(refined(phase, n).astype(int), young, nu), solver=TIGHT).bounds
         for n in (1, 2)
     )
-    margin = 1e-7 * np.trace(fine.upper)
+    margin = 1e-5 * np.trace(fine.upper)
     # Stresses on the coarse grid are among those on the fine one.
-    assert np.linalg.eigvalsh(fine.lower - 0.99 * coarse.lower)[0] > -margin
+    assert np.linalg.eigvalsh(fine.lower - coarse.lower)[0] > -margin
     assert np.linalg.eigvalsh(fine.upper - coarse.lower)[0] > -margin
     assert np.linalg.eigvalsh(coarse.upper - fine.upper)[0] > -margin
     gaps = [np.trace(x.upper - x.lower) / np.trace(x.upper) for x in (coarse, fine)]
