@@ -137,12 +137,7 @@ def wide_gap(
         if isinstance(model, LinearSystem) and not yields(model):
             modes = main_modes(model, output)
         causes.append(f"over the ranges of the inputs it is open how {modes} add up")
-        # Branch and bound has noted which input its gap fell by.
-        noted = [x for x in band.notes if x.startswith(f"gap of {output}, ")]
-        cure = "".join(noted[:1]).partition(": ")[2]
-        if not cure:
-            cure = f"narrow {_most_important(model, band, output)} first, which moves it most"
-        cures.append(cure)
+        cures.append(f"narrow {_most_important(model, band, output)} first, which moves it most")
     return f"{', and '.join(causes)}; {', or '.join(cures)}"
 
 

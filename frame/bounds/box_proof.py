@@ -7,7 +7,7 @@ value of one side of one output over the time nodes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import ClassVar, NamedTuple, Protocol
@@ -131,6 +131,38 @@ def refusing() -> Iterator[None]:
         raise UnprovedError(what, "take improved-graph-follower") from None
 
 
+def take_larger(values: Array, at: Array, new_values: Array, new_at: Array) -> None:
+    """Replace values by larger ones, in place, together with the inputs that attain them.
+
+    Args:
+        values: Attained values, of any shape.
+        at: Inputs that attain them, with a further axis.
+        new_values: Other attained values, in the shape of `values`.
+        new_at: Inputs that attain these.
+    """
+    is_larger = new_values > values
+    values[is_larger] = new_values[is_larger]
+    at[is_larger] = new_at[is_larger]
+
+
+def gap_of_peaks(problem: UnitFlow, upper: Array, attained: Array) -> float:
+    """Return the largest gap between guaranteed and attained peak, as a fraction of the peak.
+
+    A peak is the largest value over time of an output or of the output with its sign changed. The
+    larger gap of both is divided by the larger guaranteed peak; for an output at rest, whose peak
+    is rounding, by the amplitude that the energy of the response permits.
+
+    Args:
+        problem: The response over the boxes, which tells the outputs at rest.
+        upper: Guaranteed upper bounds of (−q, q), shape (levels, times, outputs, 2).
+        attained: Attained values with the same axes.
+    """
+    peaks = upper.max(axis=1)
+    largest = np.where(problem.at_rest, problem.peak, peaks.max(axis=-1))
+    gaps = (peaks - attained.max(axis=1)).max(axis=-1)
+    return float((gaps / np.maximum(largest, 1e-300)).max())
+
+
 class Hull:
     """Bounds of (−q, q) over the whole box on A levels, collected from those of its sub-boxes.
 
@@ -195,9 +227,8 @@ class Hull:
                 ones so far, of all levels; the upper ends of `least_peaks`, shape (m,), lower the
                 smallest known max |q| over time, unless it is None; and `facts` are merged by name.
         """
-        is_better = bounds.attained > self.attained[level]
-        self.attained[level][is_better] = bounds.attained[is_better]
-        self.attained_at[level][is_better] = bounds.attained_at[is_better]
+        own = self.attained[level], self.attained_at[level]
+        take_larger(*own, bounds.attained, bounds.attained_at)
         self.between_nodes = np.maximum(self.between_nodes, bounds.between_nodes)
         self.attained_error = np.maximum(self.attained_error, bounds.attained_error)
         if bounds.least_peaks is not None:
@@ -209,7 +240,7 @@ class Hull:
             is_count = name in ("boxes", "evaluations")
             self.facts[name] = earlier + value if is_count else max(earlier, value)
 
-    def envelope(self, method: str, notes: Iterable[str]) -> Envelope:
+    def envelope(self, method: str) -> Envelope:
         """Return the guaranteed envelope over the whole box, once all sub-boxes are closed.
 
         Attained values, and the inputs that attain them, are raised in place to those of narrower
@@ -217,7 +248,6 @@ class Hull:
 
         Args:
             method: Name of the proof.
-            notes: Sentences for the reader of the envelope.
 
         Returns:
             Lower and upper bounds of each output q at all levels and time nodes, `inner` bounds
@@ -237,23 +267,18 @@ class Hull:
         # trajectory of a narrower cut is one of the wider cut.
         upper = np.minimum.accumulate(self.upper, axis=0)
         for level in reversed(range(len(upper) - 1)):
-            is_better = self.attained[level + 1] > self.attained[level]
-            self.attained[level][is_better] = self.attained[level + 1][is_better]
-            self.attained_at[level][is_better] = self.attained_at[level + 1][is_better]
+            own = self.attained[level], self.attained_at[level]
+            take_larger(*own, self.attained[level + 1], self.attained_at[level + 1])
         min_peak_upper = self._min_peak_upper_bounds(upper) + self.margin
         min_peak_lower = np.maximum(self.min_peak_lower - self.margin, 0.0)
         upper = upper + self.margin[:, np.newaxis]
         attained = self.attained - self.margin[:, np.newaxis]
         self._require_consistent(upper, attained)
         error = (upper - attained).max(axis=-1)
-        largest = np.maximum(np.abs(upper).max(axis=(1, 3)), 1e-300)
-        # The gap of an output at rest is judged by what the energy of the response allows.
-        largest = np.where(self.problem.at_rest, self.problem.peak, largest)
-        peak_gaps = (upper.max(axis=1) - attained.max(axis=1)).max(axis=-1)
         facts = {
             **self.facts,
             "gap": float((error / self.problem.scale).max()),
-            "gap_of_peaks": float((peak_gaps / largest).max()),
+            "gap_of_peaks": gap_of_peaks(self.problem, upper, attained),
         }
         return self.problem.envelope(
             upper,
@@ -271,7 +296,6 @@ class Hull:
             attained_error=self.attained_error + 2 * self.margin,
             evaluations=int(facts.pop("evaluations", attained.size)),
             facts=facts,
-            notes=tuple(notes),
         )
 
     def _require_consistent(self, upper: Array, attained: Array) -> None:

@@ -43,6 +43,7 @@ from alphacut.frame.calculus.polynomials import count, exponents, product_part, 
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.modes.modal_model import (
     ModalModel,
+    OutputJets,
     largest_growth,
     response_parts,
     wave_factors,
@@ -94,13 +95,12 @@ def bound_problems(
     undivided: Array = np.full(n_problems, np.inf)
     with ThreadPoolExecutor(workers) as pool:
         while len(frontier) and examined + len(frontier) <= budget * n_problems:
-            is_undivided = examined == 0
-            examined += len(frontier)
             examine_piece = partial(examine_items, model, third, optima.value + gap, frontier)
             pieces = pool.map(examine_piece, frontier.pieces(max_items))
-            found = _joined(list(pieces))
-            if is_undivided:
+            found = Examination(*(np.concatenate(x) for x in zip(*pieces, strict=True)))
+            if not examined:
                 undivided = found.bound
+            examined += len(frontier)
             _take_better_points(model, optima, frontier, found.value, min_gain=gap / 100)
             frontier = frontier.children(found.code)
             if progress:
@@ -111,15 +111,6 @@ def bound_problems(
         found = examine_items(model, third, optima.value + gap, frontier, piece)
         np.maximum.at(bound, frontier.problem[piece.items], found.bound)
     return bound, examined
-
-
-def _joined(pieces: list[Examination]) -> Examination:
-    """Return the examinations of pieces of a frontier as one, in order."""
-    return Examination(
-        code=np.concatenate([piece.code for piece in pieces]),
-        value=np.concatenate([piece.value for piece in pieces]),
-        bound=np.concatenate([piece.bound for piece in pieces]),
-    )
 
 
 def _take_better_points(
@@ -149,7 +140,6 @@ def _take_better_points(
     problems = frontier.problem[higher]
     boxes = frontier.box[higher]
     optima.point[problems] = (frontier.low[boxes] + frontier.high[boxes]) / 2
-    optima.value[problems] = value[higher]
     refine(model, optima, np.unique(problems), frontier.lower, frontier.upper, min_gain)
 
 
@@ -357,11 +347,10 @@ def first_optima(model: ModalModel, lower: Array, upper: Array, min_gain: float)
     chunks = [model.values(points[k : k + 64]) for k in range(0, len(points), 64)]
     values = np.concatenate(chunks).reshape(len(points), -1)  # (points, T m)
     best = np.stack([values.argmin(axis=0), values.argmax(axis=0)], axis=1).ravel()
-    value = np.stack([-values.min(axis=0), values.max(axis=0)], axis=1).ravel()
     # These values choose points alone. Those that are returned come from the tables of the loads,
     # as those of branch and bound do.
-    optima = Optima(points[best], value)
-    refine(model, optima, np.arange(len(best)), lower, upper, min_gain, has_values=False)
+    optima = Optima(points[best], np.empty(len(best)))
+    refine(model, optima, np.arange(len(best)), lower, upper, min_gain)
     return optima
 
 
@@ -372,38 +361,26 @@ def refine(
     lower: Array,
     upper: Array,
     min_gain: float,
-    *,
-    has_values: bool = True,
 ) -> None:
     """Improve the best points of some problems by Newton's method within a box, in place.
 
     A problem ends when its quadratic model predicts a gain of at most `min_gain`, or after a fixed
-    number of steps. Values never decrease if `has_values`. Problems are taken in chunks that limit
-    the memory.
+    number of steps. Problems are taken in chunks that limit the memory.
 
     Args:
         model: The modal model, whose outputs are maximised with the sign of the problem's side.
         optima: Points, shape (N, d), in unit coordinates, and values, shape (N,), of all problems.
+            The values of `problems` need not be known.
         problems: Numbers of the problems to improve, each once, shape (P,); it may be empty.
         lower: Lower ends of the box, shape (d,), in unit coordinates.
         upper: Upper ends, shape (d,).
         min_gain: In units of the outputs.
-        has_values: Whether the values of these problems are known; else they are overwritten with
-            those at their points.
     """
     # Tuned: the arrays of more than 6000 problems of six inputs do not fit into the cache of a
     # processor.
     size = max(6000 * 6 // max(lower.size, 6), 1)
     for piece in np.array_split(problems, -(-len(problems) // size) or 1):
-        _newton(model, optima, piece, lower, upper, min_gain, has_values=has_values)
-
-
-class _Jets(NamedTuple):
-    """Side × output of P problems at their points."""
-
-    value: Array  # (P,)
-    gradient: Array  # (P, d)
-    hessian: Array  # (P, d, d)
+        _newton(model, optima, piece, lower, upper, min_gain)
 
 
 def _newton(
@@ -413,8 +390,6 @@ def _newton(
     lower: Array,
     upper: Array,
     min_gain: float,
-    *,
-    has_values: bool,
 ) -> None:
     """Maximise side × output of some problems by trust-region steps within a box, in place.
 
@@ -432,15 +407,12 @@ def _newton(
         lower: Lower ends of the box, shape (d,).
         upper: Upper ends, shape (d,).
         min_gain: In units of the outputs.
-        has_values: Whether the values of these problems are known; else they are overwritten with
-            those at their points first.
     """
     box_width = 2.0  # of the unit box [−1, 1]^d
     # Tuned: with a larger first radius more first steps fail.
     radius: Array = np.full(len(problems), 0.4)
     jets = _jets(model, optima.point[problems], problems)
-    if not has_values:
-        optima.value[problems] = jets.value
+    optima.value[problems] = jets.value
     gradient = jets.gradient
     hessian = jets.hessian
     # A problem that has not converged after 300 steps, which is rare, keeps an attained value.
@@ -488,7 +460,7 @@ def _newton(
         radius = np.select([ratio > 0.75, ratio < 0.25], [wider, narrower], radius)
 
 
-def _jets(model: ModalModel, points: Array, problems: Ints) -> _Jets:
+def _jets(model: ModalModel, points: Array, problems: Ints) -> OutputJets:
     """Return side × output of P problems, each at a point of its own, with derivatives.
 
     Args:
@@ -503,7 +475,7 @@ def _jets(model: ModalModel, points: Array, problems: Ints) -> _Jets:
     node, column = np.divmod(problems, 2 * len(model.flow.outputs))
     found = model.at(points, node, column // 2)
     side = 2.0 * (column % 2) - 1
-    return _Jets(
+    return OutputJets(
         value=side * found.value,
         gradient=side[:, np.newaxis] * found.gradient,
         hessian=side[:, np.newaxis, np.newaxis] * found.hessian,

@@ -30,11 +30,11 @@ from alphacut.frame.bounds.node_bounds import Cells, Effort, bound_nodes, halve_
 from alphacut.frame.calculus.polynomials import monomials
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.modes.modes import Modes, Oscillator
+from alphacut.frame.response.chord_deviation import Grid
 from alphacut.frame.response.oscillators import (
-    Grid,
-    ModalResponses,
     Oscillators,
     grid_over,
+    intervals,
 )
 
 
@@ -70,51 +70,39 @@ def response_tables(
             within a sample interval of a load.
     """
     time = modes.time
-    by_order: dict[int, list[list[ModalResponses]]] = {order: [] for order in orders}
-    deviations: dict[int, list[list[Array]]] = {order: [] for order in orders}
+    by_order = {order: list[list[Array]]() for order in orders}
     for grid in grids:
         oscillators = Oscillators(grid, time, orders)
         for order, of_order in by_order.items():
-            of_order.append([oscillators.responses(x, order) for x in modes.sources])
-            of_mode = [oscillators.line_deviation(x, order) for x in modes.sources]
-            deviations[order].append(of_mode)
+            responses = [oscillators.responses(x, order) for x in modes.sources]
+            value = np.array([x.value.reshape(len(time), -1) for x in responses])
+            error = np.array([x.error for x in responses])
+            deviation = np.array([oscillators.line_deviation(x, order) for x in modes.sources])
+            of_order.append([value, np.abs(value).max(axis=(-2, -1)), error, deviation])
     tables = {}
     for order, of_order in by_order.items():
-        value = np.array([[x.value.reshape(len(time), -1) for x in mode] for mode in of_order])
-        error = np.array([[x.error for x in mode] for mode in of_order])
-        max_magnitude = np.abs(value).max(axis=-1)
-        require_in_range({"table": max_magnitude})
-        tables[order] = ResponseTable(
-            value=value,
-            max_magnitude=max_magnitude.max(axis=-1),
-            error=error,
-            interpolation_error=np.array(deviations[order]),
-        )
+        tables[order] = ResponseTable(*map(np.stack, zip(*of_order, strict=True)))
+        require_in_range({"table": tables[order].max_magnitude})
     return tables
 
 
-def _table_points(oscillators: Sequence[Oscillator], duration: float) -> tuple[int, int]:
+def _table_points(oscillators: Sequence[Oscillator], time: Array) -> tuple[int, int]:
     """Return the numbers of table points along ω and along q = g/ω, the same for all modes.
 
-    The distance of points is a fraction of a mode's decay g, since this is the width of the peak of
-    its frequency response, or of the inverse duration where that is larger. More points make the
-    interpolation error of the tables smaller, with the square of their distance, and the dual
-    function slower in proportion to their number. So 9 to 81 points are taken along ω and 4 to 13
-    along q, as many as the most demanding mode asks for; these limits are tuned.
+    More points make the interpolation error of the tables smaller, with the square of their
+    distance, and the dual function slower in proportion to their number. So 9 to 81 points are
+    taken along ω and 4 to 13 along q, as many as the most demanding mode asks for; these limits are
+    tuned.
 
     Args:
         oscillators: Modes with their ranges of ω, in rad/s, and of q.
-        duration: Time of the last node, in s; 0 if it is the first one.
+        time: Time nodes, shape (T,), in s.
     """
-    along_omega = 2.0
-    along_q = 2.0
-    slowest = 2 / duration if duration > 0 else np.inf
+    asked = []
     for mode in oscillators:
-        omega_low, omega_high = mode.omega_range
-        q_low, q_high = mode.quotient_range
-        spacing = numbers.TABLE_SPACING * (max(q_low, 0.0) * omega_low + slowest)
-        along_omega = max(along_omega, (omega_high - omega_low) / spacing)
-        along_q = max(along_q, (q_high - q_low) * omega_high / spacing)
+        ends = mode.omega_range, mode.quotient_range
+        asked.append(intervals(*ends, time, fraction=numbers.TABLE_SPACING))
+    along_omega, along_q = np.max(asked, axis=0)
     return int(np.clip(along_omega, 8, 80)) + 1, int(np.clip(along_q, 3, 12)) + 1
 
 
@@ -137,7 +125,7 @@ class LevelModels:
         Raises:
             UnprovedError: A response is out of the range of the tables.
         """
-        points = _table_points(modes.oscillators, float(modes.time[-1]))
+        points = _table_points(modes.oscillators, modes.time)
         grids = [
             grid_over(mode.omega_range, mode.quotient_range, points) for mode in modes.oscillators
         ]
@@ -235,10 +223,7 @@ class OutputBounds:
             remainder_multiple=remainder_multiple,
             wanted_gap=self.wanted_gap,
             incumbent=float(max(self.model_value.max(), self.attained)),
-            patience=numbers.PATIENCE,
             ascents=numbers.ASCENTS,
-            grace=numbers.CELL_GRACE,
-            min_progress=numbers.MIN_CELL_PROGRESS,
         )
 
     def improve(self, nodes: Ints, effort: Effort) -> None:
@@ -473,14 +458,6 @@ def _scaled(models: TaylorModel, radius: Array) -> _ScaledModels:
     )
 
 
-class CellEffort(NamedTuple):
-    """Effort that a cell is worth."""
-
-    nodes: int  # most time nodes that are tried
-    steps: int  # most evaluations of the dual function for each
-    patience: int  # steps of `minimise` after which less is expected
-
-
 def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
     """Return a lower bound of an output's smallest peak over a box, by best-first bisection.
 
@@ -508,11 +485,6 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
     constants = np.stack([bounds.constant.sum(axis=0) for bounds in sides])
     # multipliers of each node, at which further cells begin
     multipliers = np.zeros((constants.shape[1], len(data.linear)))
-    effort = CellEffort(
-        nodes=numbers.LEAST_PEAK_NODES,
-        steps=numbers.LEAST_PEAK_STEPS,
-        patience=numbers.LEAST_PEAK_PATIENCE,
-    )
     max_cells = 1 + numbers.LEAST_PEAK_BISECTIONS
     cells = Cells(
         ends=np.zeros((max_cells, *data.cell.shape), np.int64),
@@ -529,7 +501,6 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
             cells.ends[cell],
             data_of_sides,
             constants,
-            effort,
             multipliers,
             at[cell],
             cells.disagreement[cell],
@@ -552,7 +523,6 @@ def _bound_cell(
     ends: Ints,
     sides: tuple[DualFunctionData, DualFunctionData],
     constants: Array,
-    effort: CellEffort,
     multipliers: Array,
     at: Array,
     disagreement: Array,
@@ -565,7 +535,6 @@ def _bound_cell(
         ends: Cell of the modes' tables, shape (K, 4).
         sides: Models and tables of −output and output.
         constants: What is added to the dual bounds of −output and output, shape (2, T).
-        effort: What the cell is worth.
         multipliers: Multipliers of each node, shape (T, Z); improved in place.
         at: Overwritten with the inputs that the dual bound names, shape (d,).
         disagreement: Overwritten with that of the variables at the node of the bound, see
@@ -587,7 +556,7 @@ def _bound_cell(
     largest = -np.inf
     u = np.zeros(len(at))
     of_node = np.empty(len(disagreement))
-    for _ in range(effort.nodes):
+    for _ in range(numbers.LEAST_PEAK_NODES):
         node = int(untried.argmax())
         if untried[node] <= max(largest, -1.0):
             break
@@ -600,8 +569,8 @@ def _bound_cell(
             node,
             2.0 * s - 1.0,
             sides[s],
-            effort.steps,
-            effort.patience,
+            numbers.LEAST_PEAK_STEPS,
+            numbers.LEAST_PEAK_PATIENCE,
             -1e300,  # no target
             (2.0 * s - 1.0) * response[node],
             of_node,

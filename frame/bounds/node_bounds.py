@@ -13,6 +13,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.kernels import compiled
+from alphacut.frame import numbers
 from alphacut.frame.bounds.dual_function import (
     DualFunctionData,
     add,
@@ -36,10 +37,7 @@ class Effort(NamedTuple):
     remainder_multiple: float
     wanted_gap: float  # distance of bound and model value that suffices
     incumbent: float  # the largest attained value of side × output over time
-    patience: int  # steps of `minimise` after which less is expected
     ascents: int  # most steps of the model's ascent
-    grace: int  # cells after which the fall of the gap counts
-    min_progress: float  # smallest fall of the gap, as a fraction of an even fall to what suffices
 
 
 class Cells(NamedTuple):
@@ -107,9 +105,9 @@ def bound_nodes(
         while count < max_cells:
             worst = int(np.argmax(cells.value[:count]))
             target = target_value(model_value, min_gap, effort, constant)
-            even_fall = (first_bound - target) * effort.min_progress * count / max_cells
+            even_fall = (first_bound - target) * numbers.MIN_CELL_PROGRESS * count / max_cells
             falls_slowly = cells.value[worst] > first_bound - even_fall
-            if cells.value[worst] <= target or (count >= effort.grace and falls_slowly):
+            if cells.value[worst] <= target or (count >= numbers.CELL_GRACE and falls_slowly):
                 break
             if not halve_cell(cells, worst, count):
                 break
@@ -167,7 +165,7 @@ def bound_cell(
         side: −1 or 1.
         data: Models and tables of the output; they are read only.
         effort: Limits of the work: at most `steps` evaluations in the minimisation of the bound,
-            which takes shorter steps after `patience` of them without enough progress, and at most
+            which takes shorter steps after some of them without enough progress, and at most
             `ascents` steps of the ascent.
         target: Value of the dual function at which its minimisation ends.
         cells: All cells; `ends` of this one must be set, and `mu` is where the minimisation begins.
@@ -182,7 +180,7 @@ def bound_cell(
         side,
         data,
         effort.steps,
-        effort.patience,
+        numbers.PATIENCE,
         target,
         model_value,
         cells.disagreement[cell],

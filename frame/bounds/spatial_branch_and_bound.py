@@ -13,16 +13,14 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
 from heapq import heappop, heappush
 
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints, Mask
-from alphacut.base.progress_bar import Progress
+from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box_proof import (
-    ROUNDING_MARGIN,
     Answer,
     BisectionError,
     BoxBounds,
@@ -54,10 +52,9 @@ class SubBox:
     min_peak_lower: Array  # lower bounds of the smallest max |q| over time, (L, m)
     is_wide: Mask  # levels on which bounds are worth little at any node, (L,)
     work: float = 1.0  # fraction of all work that it is expected to take, with its halves
-    done: float = 0.0  # completed fraction of its own bounds
 
     def on_levels(self, rows: Ints, boxes: Boxes | None = None) -> SubBox:
-        """Return a copy on some levels, with nothing done yet.
+        """Return a copy on some levels.
 
         A level is an α-cut of the inputs. Masks and bounds of these levels are copied; the expected
         fraction of all work, `work`, stays.
@@ -74,7 +71,6 @@ class SubBox:
             upper=self.upper[rows],
             min_peak_lower=self.min_peak_lower[rows],
             is_wide=self.is_wide[rows],
-            done=0.0,
         )
 
     def bisect(self, axis: int) -> list[SubBox]:
@@ -85,17 +81,16 @@ class SubBox:
 def prove(
     proof: BoxProof,
     flow: UnitFlow,
+    margin: Callable[[UnitFlow], Array],
     progress: Progress | None = None,
-    margin: Callable[[UnitFlow], Array] | None = None,
 ) -> Envelope:
     """Return the guaranteed envelope of all outputs on all α-levels, by bisection of the inputs.
 
     Args:
         proof: Bounds the outputs over any sub-box of the inputs.
         flow: The response as a function of the fuzzy inputs.
+        margin: Returns what covers the rounding of each output, shape (m,).
         progress: Called with the completed fraction, from 0 to 1.
-        margin: Returns what covers the rounding of each output, shape (m,); 1e-9 of the peaks
-            unless given.
 
     Raises:
         UnprovedError: The system is not linear, its integrator is not the exact one, bounds are not
@@ -105,7 +100,7 @@ def prove(
     """
     queue = Queue(proof, flow, margin)
     queue.run(progress)
-    return queue.hull.envelope(proof.name, queue.notes())
+    return queue.hull.envelope(proof.name)
 
 
 class Queue:
@@ -118,7 +113,7 @@ class Queue:
         self,
         proof: BoxProof,
         problem: UnitFlow,
-        margin: Callable[[UnitFlow], Array] | None = None,
+        margin: Callable[[UnitFlow], Array],
     ) -> None:
         boxes = problem.boxes
         self.proof = proof
@@ -127,7 +122,7 @@ class Queue:
         self.workers = proof.workers or os.cpu_count() or 1
         with refusing():
             proof.forecast(self.flow, boxes)
-            of_outputs = ROUNDING_MARGIN * problem.peak if margin is None else margin(problem)
+            of_outputs = margin(problem)
         self.hull = Hull(problem, self.flow, of_outputs)
         self.gap = proof.peak_gap(problem)[:, np.newaxis]  # wanted gap of each peak, (m, 1)
         if (of_outputs > 0.1 * self.gap[:, 0]).any():
@@ -146,8 +141,6 @@ class Queue:
         self.box_count = np.zeros(peaks, int)  # sub-boxes on which each peak was bounded
         self.first_gap = np.full(peaks, np.nan)  # gap of each peak after the first of them
         self.is_abandoned = np.zeros(peaks, bool)  # whether the gap falls too slowly
-        # fraction of each peak's gap that each input accounts for
-        self.gap_fractions = np.zeros((*peaks, len(boxes.names)))
         whole_box = SubBox(
             boxes=boxes,
             levels=list(range(levels)),
@@ -176,8 +169,12 @@ class Queue:
         pool = ThreadPoolExecutor(self.workers)
         try:
             while batch := self._next_batch():
-                tick = partial(self._report, progress, batch)
-                goals = [self._goal(box, self.workers // len(batch), tick) for box in batch]
+                waiting = sum(box.work for _, _, box in self.heap)
+                done = 1 - waiting - sum(box.work for box in batch)
+                goals = []
+                for box in batch:
+                    tick = subprogress(progress, done, done + OWN_WORK * box.work)
+                    goals.append(self._goal(box, self.workers // len(batch), tick))
                 all_answers = list(pool.map(self._bound, batch, goals))
                 for box, goal, answers in zip(batch, goals, all_answers, strict=True):
                     self._add_answers(box, goal, answers)
@@ -190,27 +187,6 @@ class Queue:
                         self._push(child)
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
-
-    def notes(self) -> Iterator[str]:
-        """Yield a sentence on the input to narrow, if the widest gap is above the wanted one.
-
-        The gap of a peak is the distance of its guaranteed bound from the largest attained value.
-        The peak with the largest gap in comparison with the peak itself is taken, among those that
-        sub-boxes were bounded for. Nothing is yielded where its gap is small enough or no input
-        accounts for it.
-        """
-        upper_peaks = np.minimum.accumulate(self.hull.upper.max(axis=1), axis=0)
-        incumbents = np.stack([self.hull.incumbent(level) for level in range(len(upper_peaks))])
-        gaps = np.where(self.box_count > 0, upper_peaks - incumbents, -np.inf)
-        relative_gaps = gaps / self.problem.peak[:, np.newaxis]
-        peak = np.unravel_index(relative_gaps.argmax(), relative_gaps.shape)
-        _, output, _ = peak
-        relative_gap = relative_gaps[peak]
-        fractions = self.gap_fractions[peak]
-        if relative_gap * self.problem.peak[output] > self.gap[output, 0] and fractions.any():
-            name = self.problem.boxes.names[fractions.argmax()]
-            of_peak = f"gap of {self.flow.outputs[output]}, {relative_gap:.2g} of its peak"
-            yield f"{of_peak}: {fractions.max():.0%} of it by {name}, which is to be narrowed first"
 
     def _push(self, box: SubBox) -> None:
         """Queue a sub-box by the largest excess of its bounds, in units of the gap; ties by age."""
@@ -239,30 +215,12 @@ class Queue:
                 batch.append(box.on_levels(_open_levels(box)))
         return batch
 
-    def _report(
-        self, progress: Progress | None, batch: Sequence[SubBox], box: SubBox, fraction: float
-    ) -> None:
-        """Report the completed fraction of all expected work while some sub-boxes are bounded.
-
-        Args:
-            progress: Called with the fraction, from 0 to 1; None for no report.
-            batch: The sub-boxes that are bounded now.
-            box: The one of them that has got on; its `done` is raised in place, and never falls.
-            fraction: Completed fraction of its bounds.
-        """
-        box.done = max(fraction, box.done)
-        if progress is not None:
-            waiting = sum(other.work for _, _, other in self.heap)
-            # Of a sub-box's work its own bounds take the fraction `OWN_WORK`, its halves the rest.
-            in_batch = sum(x.work * (1 - OWN_WORK * x.done) for x in batch)
-            progress(1 - waiting - in_batch)
-
     def _excess(self, box: SubBox, k: int) -> Array:
         """Return how far bounds of peaks exceed incumbent + gap on row k of a sub-box, (m, 2)."""
         upper_peaks = box.upper[k].max(axis=0)
         return np.asarray(upper_peaks - self.hull.incumbent(box.levels[k]) - self.gap)
 
-    def _goal(self, box: SubBox, workers: int, tick: Callable[[SubBox, float], None]) -> Goal:
+    def _goal(self, box: SubBox, workers: int, tick: Progress) -> Goal:
         """Return which bounds the proof is asked for over a sub-box, and what is known there.
 
         On a level on which bounds are worth little at any node (`is_wide`), all bounds of open
@@ -272,7 +230,7 @@ class Queue:
         Args:
             box: The sub-box.
             workers: Number of threads for it; at least one is given.
-            tick: Called with the sub-box and the completed fraction of its bounds.
+            tick: Called with the completed fraction of its bounds.
 
         Returns:
             `needed`, the bounds that are asked for, and `known_upper`, those that are known, shape
@@ -291,7 +249,7 @@ class Queue:
             incumbent=incumbent,
             workers=max(workers, 1),
             is_last=self.refusals >= self.proof.parts - 1,
-            tick=partial(tick, box),
+            tick=tick,
         )
 
     def _bound(self, box: SubBox, goal: Goal) -> Sequence[Answer]:
@@ -359,7 +317,6 @@ class Queue:
             upper_peaks = np.maximum(box.upper[k].max(axis=0), self._waiting_peaks(level))
             gap = upper_peaks - self.hull.incumbent(level)
             self.box_count[level] += is_open
-            self.gap_fractions[level][is_open] = bounds.gap_fractions[is_open]
             is_first = np.isnan(self.first_gap[level])
             first_gap = np.where(is_first, gap, self.first_gap[level])
             self.first_gap[level][is_open] = first_gap[is_open]

@@ -20,9 +20,11 @@ from alphacut.base.arrays import Array
 from alphacut.frame.bounds.box import parameters_over_box
 from alphacut.frame.bounds.box_proof import ROUNDING_MARGIN
 from alphacut.frame.bounds.close_modes import Moments, Squares, by_fit, by_signs, moments_of
-from alphacut.frame.calculus.taylor_model import TaylorModel, all_on_subbox, concatenate
+from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.modes.mode_groups import ModeGroup, mode_groups, undamped_structure
+from alphacut.frame.modes.mode_groups import ModeGroup, mode_groups
+from alphacut.frame.modes.model_fields import on_subbox
+from alphacut.frame.modes.structure import with_classical_damping
 from alphacut.frame.spectra.displacement_chord import displacement_chord, max_acceleration
 from alphacut.frame.spectra.modal_combination import (
     Combination,
@@ -251,8 +253,9 @@ class _Problem:
         """
         try:
             parameters = parameters_over_box(self.system, self.names, low, high)
-            has_ratios = self.combination.rule == "CQC" and self.combination.own_ratios
-            structure = undamped_structure(self.system, parameters, has_ratios=has_ratios)
+            structure = self.system.assembly(parameters)
+            if self.combination.rule == "CQC" and self.combination.own_ratios:
+                structure = with_classical_damping(structure)
             groups, along = mode_groups(structure, self.combination.modes)
             yield _Part(low, high, groups, self.squares(groups), along, is_enclosed=True)
             return
@@ -281,7 +284,7 @@ class _Part:
 
     low: Array
     high: Array
-    groups: Sequence[ModeGroup]
+    groups: list[ModeGroup]
     squares: Squares
     bisection_input: int | None = None
     is_enclosed: bool = False
@@ -302,14 +305,9 @@ class _Part:
         active = np.flatnonzero(self.high > self.low)
         ends = _halves(self.low, self.high, int(active[axis]))
         unit = np.ones(len(active))
-        models = [model for group in self.groups for model in group.models]
         halves = []
         for half, (low, high) in zip(ends, _halves(-unit, unit, axis), strict=True):
-            moved = iter(all_on_subbox(models, low, high))
-            groups = []
-            for group in self.groups:
-                own = [next(moved) for _ in group.models]
-                groups.append(group.with_models(own))
+            groups = on_subbox(self.groups, low, high)
             halves.append(_Part(*half, groups, problem.squares(groups)))
         return halves
 

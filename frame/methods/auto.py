@@ -15,7 +15,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar
 
@@ -24,7 +23,7 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number
 from alphacut.base.progress_bar import Progress, subprogress
-from alphacut.frame.bounds.box_proof import refusing
+from alphacut.frame.bounds.box_proof import gap_of_peaks, refusing
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, MAX_PARAMETERS, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
@@ -123,10 +122,12 @@ class Auto(Method):
         follower = ImprovedFollower(0.15 * tolerance, seed=self.seed)
         reasons: list[str] = []
         proved: list[Envelope] = []
-        attempts = _progress_of_attempts(progress)
+        # It is not known beforehand whether the first proof is enough; it usually is.
+        of_proofs = subprogress(progress, 0.0, 0.8)
+        of_follower = subprogress(progress, 0.8, 1.0)
         for proof in self._proofs(flow, reasons):
             try:
-                found = proof.run(flow, next(attempts))
+                found = proof.run(flow, of_proofs)
             except UnprovedError as error:
                 reasons.append(f"{proof.name}: {error}")
                 continue
@@ -136,17 +137,17 @@ class Auto(Method):
             reasons.append(f"{proof.name}: its gap is wider than the tolerance")
 
         # A wide guarantee is better than none, unless a stated tolerance is meant for all nodes.
-        best = min(proved, key=lambda found: _gap(found, flow), default=None)
+        best = min(proved, key=lambda found: found.facts["gap_of_peaks"], default=None)
         if best is not None and not self.is_for_all_nodes:
-            if _gap(best, flow) <= WIDE:
+            if best.facts["gap_of_peaks"] <= WIDE:
                 return _noted(best, "; ".join([f"{best.method} succeeded", *reasons]))
             # Responses are worth computing where bounds lie above the attained peak; elsewhere
             # they cannot raise it.
             outer, inner = _sides(best)
             asked = outer > inner.max(axis=1, keepdims=True)
-            followed = follower.run_pass(flow, next(attempts), asked)
+            followed = follower.run_pass(flow, of_follower, asked)
             return _noted(_with_reached(best, flow, followed), f"{best.method} and {follower.name}")
-        found = follower.run(flow, next(attempts))
+        found = follower.run(flow, of_follower)
         if best is not None:
             found = replace(found, outer=best.proved)
         return _noted(found, f"{follower.name}; unproved: {'; '.join(reasons)}")
@@ -162,10 +163,9 @@ class Auto(Method):
 
         # At most 1000 sub-boxes take a minute or two (tuned: more hardly close gaps).
         proof = Proof(None, self.tolerance, boxes=1000, thresholds=self.thresholds)
-        attempts = _progress_of_attempts(progress)
         outer = None
         try:
-            proved = proof.run(flow, next(attempts))
+            proved = proof.run(flow, subprogress(progress, 0.0, 0.8))
         except UnprovedError as error:
             reason = str(error)
         else:
@@ -173,7 +173,7 @@ class Auto(Method):
                 return _noted(proved, f"{proof.name} succeeded")
             outer = proved.proved
             reason = "its gap is wider than the tolerance"
-        found = replace(PeakSearch().run(flow, next(attempts)), outer=outer)
+        found = replace(PeakSearch().run(flow, subprogress(progress, 0.8, 1.0)), outer=outer)
         return _noted(found, f"{PeakSearch.name}; unproved: {reason}")
 
     def _proofs(self, flow: UnitFlow, reasons: list[str]) -> list[Proof | DualProof]:
@@ -262,22 +262,7 @@ class Auto(Method):
         allowed_gap = WIDE
         if self.tolerance and flow.relative and len(flow.boxes.names) <= FEW_INPUTS:
             allowed_gap = 2 * self.tolerance
-        return _gap(proved, flow) <= allowed_gap
-
-
-def _progress_of_attempts(progress: Progress | None) -> Iterator[Progress | None]:
-    """Yield, without end, a function for the progress of each method that is tried in turn.
-
-    It is not known beforehand whether more methods are needed; one is usually enough. Each one is
-    shown as 80 % of what is left of the whole, so that the end is never passed.
-
-    Args:
-        progress: Called with the completed fraction of the whole; with None, None is yielded.
-    """
-    left = 1.0
-    while True:
-        yield progress and subprogress(progress, 1 - left, 1 - 0.2 * left)
-        left *= 0.2
+        return proved.facts["gap_of_peaks"] <= allowed_gap
 
 
 def _with_reached(proved: Envelope, flow: UnitFlow, followed: PassBounds) -> Envelope:
@@ -303,14 +288,14 @@ def _with_reached(proved: Envelope, flow: UnitFlow, followed: PassBounds) -> Env
     inner = np.where(better, values, inner)
     at = np.stack([proved.lower_at, proved.upper_at], axis=-2)
     at = np.where(better[..., np.newaxis], flow.boxes.to_physical(followed.points), at)
-    combined = replace(
+    return replace(
         proved,
         inner=Ends(-inner[..., 0], inner[..., 1]),
         lower_at=at[..., 0, :],
         upper_at=at[..., 1, :],
         error=(outer - inner).max(axis=-1),
+        facts={**proved.facts, "gap_of_peaks": gap_of_peaks(flow, outer, inner)},
     )
-    return replace(combined, facts={**combined.facts, "gap_of_peaks": _gap(combined, flow)})
 
 
 def _sides(proved: Envelope) -> tuple[Array, Array]:
@@ -327,26 +312,6 @@ def _sides(proved: Envelope) -> tuple[Array, Array]:
     outer = np.stack([-proved.lower, proved.upper], axis=-1)
     inner = np.stack([-proved.inner.lower, proved.inner.upper], axis=-1)
     return outer, inner
-
-
-def _gap(proved: Envelope, flow: UnitFlow) -> float:
-    """Return the largest gap between guaranteed and attained peak, as a fraction of the peak.
-
-    A peak is the largest value over time of an output or of the output with its sign changed. The
-    larger gap of both is divided by the larger guaranteed peak; for an output that rounding alone
-    moves, by the amplitude that the energy of the response permits.
-
-    Args:
-        proved: A guaranteed envelope with attained bounds.
-        flow: The response over the boxes of the inputs, which tells the outputs at rest.
-    """
-    outer, inner = _sides(proved)
-    outer_peaks = outer.max(axis=1)  # (levels, outputs, 2)
-    inner_peaks = inner.max(axis=1)
-    # The peak of an output at rest is rounding; what the energy permits is taken in its place.
-    peak = np.where(flow.at_rest, flow.peak, outer_peaks.max(axis=-1))
-    gaps = (outer_peaks - inner_peaks).max(axis=-1)
-    return float((gaps / np.maximum(peak, 1e-300)).max())
 
 
 def _noted(envelope: Envelope, why: str) -> Envelope:

@@ -86,7 +86,7 @@ class DualProof(Method):
                 or the integrator is not the exact one.
             FailedError: An attained value exceeds a guaranteed bound: the proof is wrong.
         """
-        return prove(self, flow, progress, rounding_margin)
+        return prove(self, flow, rounding_margin, progress)
 
     @property
     def bounds_peaks_alone(self) -> bool:

@@ -21,6 +21,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import checked_number
 from alphacut.base.progress_bar import Progress, subprogress
+from alphacut.frame.bounds.box_proof import take_larger
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import global_maximum, local_maximum
 from alphacut.frame.dynamics.flow import LinearFlow
@@ -304,9 +305,7 @@ class _LevelModels:
         """
         values, index = largest_values(self.storage.flow, points)
         # The first of equal trajectories is kept, so that the result does not depend on later ones.
-        better = values > self.sampled
-        self.sampled[better] = values[better]
-        self.sampled_at[better] = points[index][better]
+        take_larger(self.sampled, self.sampled_at, values, points[index])
 
     def crossed_optima(self, rng: np.random.Generator) -> Array:
         """Return points between known optima, which may lie in a basin that no model shows.

@@ -25,7 +25,13 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number
 from alphacut.base.progress_bar import Progress
 from alphacut.frame import numbers
-from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds, Goal, refusing
+from alphacut.frame.bounds.box_proof import (
+    BisectionError,
+    BoxBounds,
+    Goal,
+    refusing,
+    take_larger,
+)
 from alphacut.frame.bounds.branch_and_bound import (
     Optima,
     bound_problems,
@@ -113,7 +119,7 @@ class Proof(Method):
             )
         # Without a tolerance the gap is the tolerance, too.
         tolerance = flow.tolerance(self.tolerance or self.gap)
-        return prove(replace(self, tolerance=tolerance), flow, progress, rounding_margin)
+        return prove(replace(self, tolerance=tolerance), flow, rounding_margin, progress)
 
     def peak_gap(self, flow: UnitFlow) -> Array:
         """Return the largest gap allowed at the peak of each output, shape (outputs,)."""
@@ -269,9 +275,7 @@ def bound_levels(
         optima = first_optima(model, lower, upper, numbers.NEWTON_GAP * search_gap)
         if all_optima:  # a wider box contains what the narrower one attains
             inside = all_optima[-1]
-            better = inside.value > optima.value
-            optima.value[better] = inside.value[better]
-            optima.point[better] = inside.point[better]
+            take_larger(optima.value, optima.point, inside.value, inside.point)
         proved, count = bound_problems(
             model,
             lower,

@@ -11,6 +11,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import checked_number
 from alphacut.base.progress_bar import Progress
+from alphacut.frame.bounds.box_proof import take_larger
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.methods.method import Method
@@ -88,9 +89,7 @@ class Sampled(Method):
             lower, upper = flow.boxes.unit_ends(level)
             points = self.points(lower, upper)
             values, index = largest_values(flow, points, tick)
-            better = values > bounds[level]
-            bounds[level][better] = values[better]
-            at[level][better] = points[index][better]
+            take_larger(bounds[level], at[level], values, points[index])
         return flow.envelope(
             bounds,
             flow.boxes.to_physical(at),

@@ -9,7 +9,6 @@ X̃(u) and L̃(u) of some degree, which need no proof; `enclosed_block` bounds w
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
@@ -45,28 +44,6 @@ class Block:
         )
         of_mass = np.diag(self.modal_mass.remainder) / np.diag(self.modal_mass.value)
         return float(max(of_eigenvalues.max(), of_mass.max()))
-
-    def truncated(self, order: int) -> Block:
-        """Return the block with its Taylor models truncated to a lower order."""
-        return self._with_models(lambda model: model.truncated(order))
-
-    def embedded(self, used: Ints, inputs: int) -> Block:
-        """Return the block as functions of all inputs, of which those at `used` are its own."""
-        return self._with_models(lambda model: model.embedded(used, inputs))
-
-    def _with_models(self, change: Callable[[TaylorModel], TaylorModel]) -> Block:
-        """Return the block of the same modes with each of its four Taylor models changed.
-
-        Args:
-            change: Function from the present to the new model, such as one that truncates it.
-        """
-        return Block(
-            modes=self.modes,
-            eigenvalue_block=change(self.eigenvalue_block),
-            shapes=change(self.shapes),
-            mass_times_shapes=change(self.mass_times_shapes),
-            modal_mass=change(self.modal_mass),
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,13 +200,6 @@ def subspace_series(
     return SubspaceSeries(eigenvalue_block, shapes, mass_times_shapes)
 
 
-class RightSides(NamedTuple):
-    """Bounds of the right sides of the equations of `enclosed_block`."""
-
-    of_shapes: Array  # of the equation of Z, its rows the modes of the block, (p, n)
-    of_eigenvalues: Array  # of the transposed equation of N D, (p, p)
-
-
 class SubspaceEquations(NamedTuple):
     """Bounds over the box of the magnitudes in the equations of `enclosed_block`.
 
@@ -243,7 +213,7 @@ class SubspaceEquations(NamedTuple):
     coupling: Array  # |Fᵀ|, L̃ᵀ off its diagonal, (p, p)
     difference: Array  # |L̃_jj − L̃_ii|, (p, p)
 
-    def right_sides(self, Y: Array, E: Array) -> RightSides:
+    def right_sides(self, Y: Array, E: Array) -> tuple[Array, Array]:
         """Return bounds of the right sides of the equations for the error of an invariant subspace.
 
         With K (X̃ + Z) = M (X̃ + Z)(L̃ + D), series X̃ and L̃ of p modes and their errors Z and D,
@@ -263,15 +233,15 @@ class SubspaceEquations(NamedTuple):
             E: Bound of |Dᵀ|, shape (p, p).
 
         Returns:
-            `of_shapes`, for the first equation with its modes as rows, shape (p, n), and
-            `of_eigenvalues`, for the transposed second one, shape (p, p).
+            That of the first equation with its modes as rows, shape (p, n), and that of the
+            transposed second one, shape (p, p).
         """
         R, X, MX, M, F, difference = self
         of_shapes = R + E @ MX + (F + 2 * E) @ Y @ M
         W = Y @ MX.T
         # L̃ᵀW − W L̃ is bounded by the diagonal of L̃, |L̃_jj − L̃_ii| W, and by F.
         of_eigenvalues = R @ X.T + Y @ R.T + difference * W + W @ F.T + F @ W + 2 * E @ W
-        return RightSides(of_shapes, of_eigenvalues)
+        return of_shapes, of_eigenvalues
 
 
 def enclosed_block(
@@ -342,11 +312,11 @@ def enclosed_block(
     Y = np.zeros_like(equations.residual)
     E = np.zeros_like(equations.coupling)
     for _ in range(60):
-        right = equations.right_sides(Y, E)
+        of_shapes, of_eigenvalues = equations.right_sides(Y, E)
         new_Y = np.zeros_like(Y)
         for j, system in enumerate(systems):
-            new_Y[j, others] = system.solution_bounds(right.of_shapes[j, others])
-        new_E = right.of_eigenvalues @ inverse_modal_mass
+            new_Y[j, others] = system.solution_bounds(of_shapes[j, others])
+        new_E = of_eigenvalues @ inverse_modal_mass
         # Entries of X are 1 in the block's own row; far larger bounds do not converge.
         if not (new_Y.max() < 10.0 and np.isfinite(new_E).all()):
             return None
@@ -368,6 +338,17 @@ def enclosed_block(
         mass_times_shapes=Mx.widened(Y @ equations.mass),
         modal_mass=modal_mass.widened(error),
     )
+
+
+def eigenvalue_discs(block: TaylorModel) -> tuple[Array, Array]:
+    """Return lower and upper ends over the box of Gershgorin's discs of a matrix, shape (p,) each.
+
+    Together they contain its diagonal and all of its eigenvalues, if these are real.
+    """
+    j = np.arange(len(block.remainder))
+    low, high = block[j, j].bounds()
+    radius = (block.magnitude() * (1.0 - np.eye(len(j)))).sum(axis=1)
+    return low - radius, high + radius
 
 
 def _polynomial(parts: list[Array], inputs: int) -> TaylorModel:

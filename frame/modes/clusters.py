@@ -31,6 +31,7 @@ from alphacut.frame.modes.blocks import (
     max_eigenvalue_decrease,
     narrowest_block,
 )
+from alphacut.frame.modes.model_fields import with_models
 from alphacut.frame.modes.modes import Ends, Oscillator, overlap, range_of
 from alphacut.frame.modes.structure import ClassicalStructure
 from alphacut.frame.response.oscillators import Source
@@ -142,13 +143,10 @@ def _decreases(centre: CentredMatrices, steepest_input: int) -> tuple[float, flo
     # S M(0) S and S K(0) S are the identity, but for coordinates without mass
     mass_scale = centre.has_mass
     stiffness_scale = np.diag(centre.stiffness.value) ** -0.5
-    mass = max(
-        max_eigenvalue_decrease(centre.mass, mass_scale, sign=1.0),
-        max_eigenvalue_decrease(centre.mass, mass_scale, sign=-1.0),
-    )
+    signs = (1.0, -1.0)
+    mass = max(max_eigenvalue_decrease(centre.mass, mass_scale, sign=x) for x in signs)
     stiffness = max(
-        max_eigenvalue_decrease(centre.stiffness, stiffness_scale, sign=1.0),
-        max_eigenvalue_decrease(centre.stiffness, stiffness_scale, sign=-1.0),
+        max_eigenvalue_decrease(centre.stiffness, stiffness_scale, sign=x) for x in signs
     )
     if not (mass < 1 and stiffness < 1):
         what = "the structure may lose its stiffness"
@@ -374,12 +372,15 @@ class BlockParticipation:
         degree = 4
         while degree < 6 and comb(2 * d + degree + 1, degree + 1) <= 100_000:
             degree += 1
-        block = block.truncated(min(degree, block.modal_mass.order))
+        degree = min(degree, block.modal_mass.order)
+        block = with_models(block, lambda model: model.truncated(degree))
         has_constant_rows = not len(rows.active_inputs())
         if has_constant_rows and not len(patterns.active_inputs()):
             patterns = block.modal_mass.like(patterns.value).widened(patterns.remainder)
         else:
-            block = block.truncated(patterns.order).embedded(used, patterns.inputs)
+            order = patterns.order
+            inputs = patterns.inputs
+            block = with_models(block, lambda x: x.truncated(order).embedded(used, inputs))
         # Constant rows are numbers but for rounding, and their product is one with numbers.
         if has_constant_rows:
             rounding = block.shapes.magnitude() @ rows.remainder.T
@@ -495,7 +496,7 @@ def damped_ranges(
 
     Args:
         structure: The structure over the box, whose damping factors a, b and ζ vary in it.
-        low: In 1/s², positive.
+        low: In 1/s².
         high: In 1/s².
         modes: Indices of the modes, shape (p,), p ≥ 1, for their damping ratios.
 
@@ -503,24 +504,36 @@ def damped_ranges(
         `omega`, lower and upper end in rad/s, and `quotient`, those of g/ω.
 
     Raises:
-        UnprovedError: One of them may not oscillate, since g/√λ may reach 1.
+        UnprovedError: One of them may not oscillate, since λ may be zero or g/√λ may reach 1.
     """
-    rayleigh_low, rayleigh_high = structure.rayleigh.bounds()
-    a_low, b_low = np.maximum(rayleigh_low, 0.0)
-    a_high, b_high = np.maximum(rayleigh_high, 0.0)
-    ratio_low, ratio_high = structure.damping_ratios[modes].bounds()
-    slow = np.sqrt(low)
-    fast = np.sqrt(high)
-    # The ratio of damping of a mode is g/√λ = a/(2 √λ) + b √λ/2 + ζ.
-    max_damping = float(a_high / (2 * slow) + b_high * fast / 2 + np.maximum(ratio_high, 0.0).max())
-    min_damping = float(a_low / (2 * fast) + b_low * slow / 2 + np.maximum(ratio_low, 0.0).min())
+    if low <= 0:
+        raise UnprovedError("the structure may lose its stiffness", "take narrower inputs")
+    slow = float(np.sqrt(low))
+    fast = float(np.sqrt(high))
+    ratios = structure.damping_ratios[modes]
+    min_damping, max_damping = damping_range(structure.rayleigh, ratios, (slow, fast))
     if max_damping >= 1:
         raise UnprovedError("a mode may not oscillate", "take less damping")
-    min_ratio = np.sqrt(1 - max_damping**2)  # the smallest ω/√λ
-    return DampedRanges(
-        omega=(float(slow * min_ratio), float(fast)),
-        quotient=(min_damping, float(max_damping / min_ratio)),
-    )
+    min_ratio = float(np.sqrt(1 - max_damping**2))  # the smallest ω/√λ
+    return DampedRanges((slow * min_ratio, fast), (min_damping, max_damping / min_ratio))
+
+
+def damping_range(rayleigh: TaylorModel, ratios: TaylorModel, omega: Ends) -> Ends:
+    """Return the ends of the ratios a/(2 √λ) + b √λ/2 + ζ of modes over the box.
+
+    Args:
+        rayleigh: Rayleigh's factors a in 1/s and b in s, shape (2,).
+        ratios: Stated damping ratios ζ of the modes, shape (p,).
+        omega: Smallest and largest √λ, in rad/s, positive.
+    """
+    slow, fast = omega
+    rayleigh_low, rayleigh_high = rayleigh.bounds()
+    a_low, b_low = np.maximum(rayleigh_low, 0.0)
+    a_high, b_high = np.maximum(rayleigh_high, 0.0)
+    ratio_low, ratio_high = ratios.bounds()
+    smallest = a_low / (2 * fast) + b_low * slow / 2 + np.maximum(ratio_low, 0.0).min()
+    largest = a_high / (2 * slow) + b_high * fast / 2 + np.maximum(ratio_high, 0.0).max()
+    return float(smallest), float(largest)
 
 
 def source_patterns(structure: ClassicalStructure, sources: Sequence[Source]) -> TaylorModel:

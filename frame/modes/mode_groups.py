@@ -7,20 +7,26 @@ subspace (see `truncated_modes`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.base.arrays import Array, Ints
+from alphacut.base.arrays import Ints
 from alphacut.frame.calculus.taylor_model import TaylorModel, solve
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.modes.clusters import BlockParticipation, centred_matrices, enclose_subspaces
+from alphacut.frame.modes.blocks import eigenvalue_discs
+from alphacut.frame.modes.clusters import (
+    BlockParticipation,
+    centred_matrices,
+    damping_range,
+    enclose_subspaces,
+)
+from alphacut.frame.modes.model_fields import with_models
 from alphacut.frame.modes.modes import Ends
-from alphacut.frame.modes.structure import with_classical_damping
+from alphacut.frame.modes.structure import modal_ratios
 from alphacut.frame.modes.truncated_modes import ModalSums, modal_sums_of_block, sums_over_all_modes
-from alphacut.frame.structures.linear import LinearSystem, stack
+from alphacut.frame.structures.linear import Assembly, stack
 
 
 class Subspace(NamedTuple):
@@ -57,40 +63,9 @@ class ModeGroup:
     subspace: Subspace | None = None
 
     @property
-    def models(self) -> list[TaylorModel]:
-        """All Taylor models of the group."""
-        of_subspace = self.subspace or ()
-        return [self.eigenvalue_block, self.ratios, self.rayleigh, *self.sums, *of_subspace]
-
-    def with_models(self, models: Sequence[TaylorModel]) -> ModeGroup:
-        """Return the group with other models in the order of `models`."""
-        block, ratios, rayleigh, *others = models
-        count = len(ModalSums._fields)
-        return replace(
-            self,
-            eigenvalue_block=block,
-            ratios=ratios,
-            rayleigh=rayleigh,
-            sums=ModalSums(*others[:count]),
-            subspace=Subspace(*others[count:]) if self.subspace else None,
-        )
-
-    @property
-    def eigenvalue_discs(self) -> tuple[Array, Array]:
-        """Lower and upper ends of Gershgorin's discs, shape (p,) each, in 1/s².
-
-        Together they contain all eigenvalues.
-        """
-        j = np.arange(len(self.eigenvalue_block.remainder))
-        low, high = self.eigenvalue_block[j, j].bounds()
-        off_diagonal = self.eigenvalue_block.magnitude() * (1.0 - np.eye(len(j)))
-        radius = off_diagonal.sum(axis=1)
-        return low - radius, high + radius
-
-    @property
     def has_gap(self) -> bool:
         """Whether the modes are not enclosed, or some keep apart from the others in the box."""
-        low, high = self.eigenvalue_discs
+        low, high = eigenvalue_discs(self.eigenvalue_block)
         order = low.argsort()
         reached = np.maximum.accumulate(high[order])
         return not self.is_whole or bool((low[order][1:] > reached[:-1]).any())
@@ -102,7 +77,7 @@ class ModeGroup:
         Raises:
             UnprovedError: An eigenvalue may be zero.
         """
-        low, high = self.eigenvalue_discs
+        low, high = eigenvalue_discs(self.eigenvalue_block)
         if low.min() <= 0:
             raise UnprovedError("the structure may lose its stiffness", "take narrower inputs")
         return float(2 * np.pi / np.sqrt(high.max())), float(2 * np.pi / np.sqrt(low.min()))
@@ -110,61 +85,10 @@ class ModeGroup:
     @property
     def ratio_range(self) -> Ends:
         """Ends of the damping ratios a/(2 ω) + b ω/2 + ζ of the modes of the group in the box."""
-        low = np.maximum(self.rayleigh.bounds()[0], 0.0)
-        high = self.rayleigh.bounds()[1]
-        stated_low, stated_high = self.ratios.bounds()
         shortest, longest = self.period_range
-        smallest = low[0] * shortest / (4 * np.pi) + low[1] * np.pi / longest
-        largest = high[0] * longest / (4 * np.pi) + high[1] * np.pi / shortest
-        return float(smallest + stated_low.min()), float(largest + stated_high.max())
-
-
-class UndampedStructure(NamedTuple):
-    """A structure over a box whose modes are those without damping; n unknowns, m outputs."""
-
-    mass: TaylorModel  # M, (n, n)
-    stiffness: TaylorModel  # K, (n, n)
-    output_rows: TaylorModel  # rows of the outputs on displacements, (m, n)
-    output_factors: TaylorModel  # what the outputs are multiplied by, (m,)
-    ground_pattern: Array  # ι, how the unknowns move with the ground, (n,)
-    rayleigh: TaylorModel  # a and b, (2,)
-    damping_ratios: TaylorModel  # ζ_k of the modes with mass by rising frequency, (modes,)
-
-
-def undamped_structure(
-    system: LinearSystem, parameters: Mapping[str, TaylorModel], *, has_ratios: bool
-) -> UndampedStructure:
-    """Return a structure for its modes without damping.
-
-    Args:
-        system: The structure, whose outputs take displacements alone.
-        parameters: Value of each of its parameters, by name, as a scalar Taylor model of the
-            inputs.
-        has_ratios: Whether the damping ratios of the modes count: then nothing may couple the
-            modes.
-
-    Raises:
-        UnprovedError: Damping couples the modes, and `has_ratios` is set.
-    """
-    assembly = system.assembly(parameters)
-    if has_ratios:
-        assembly = with_classical_damping(assembly)
-    n = len(assembly.pattern)
-    rows = assembly.rows
-    if isinstance(rows, np.ndarray):
-        rows = assembly.mass.like(rows)
-    ratios = assembly.ratios or [assembly.rayleigh[0] * 0.0]
-    if len(ratios) == 1:
-        ratios = ratios * len(assembly.massive)
-    return UndampedStructure(
-        mass=assembly.mass,
-        stiffness=assembly.stiffness,
-        output_rows=rows[:, :n],
-        output_factors=assembly.row_factors,
-        ground_pattern=assembly.pattern,
-        rayleigh=stack(list(assembly.rayleigh)),
-        damping_ratios=stack(ratios),
-    )
+        return damping_range(
+            self.rayleigh, self.ratios, (2 * np.pi / longest, 2 * np.pi / shortest)
+        )
 
 
 class ModeGroups(NamedTuple):
@@ -175,11 +99,12 @@ class ModeGroups(NamedTuple):
     bisection_input: int | None
 
 
-def mode_groups(structure: UndampedStructure, count: int | None) -> ModeGroups:
+def mode_groups(structure: Assembly[TaylorModel], count: int | None) -> ModeGroups:
     """Return the lowest modes of a structure over its box, in groups.
 
     Args:
-        structure: The structure over the box.
+        structure: The structure over the box, whose outputs take displacements alone. Its damping
+            plays no part.
         count: Number of modes; all if it is None or larger than their number.
 
     Raises:
@@ -188,8 +113,11 @@ def mode_groups(structure: UndampedStructure, count: int | None) -> ModeGroups:
     centre, used = centred_matrices(structure.mass, structure.stiffness)
     count = min(count or centre.mode_count, centre.mode_count)
     found = enclose_subspaces(centre, used, count)
-    patterns = structure.mass.like(structure.ground_pattern @ np.linalg.inv(centre.basis).T)[None]
-    rows = structure.output_rows @ centre.basis
+    patterns = structure.mass.like(structure.pattern @ np.linalg.inv(centre.basis).T)[None]
+    output_rows = structure.rows
+    if isinstance(output_rows, np.ndarray):
+        output_rows = structure.mass.like(output_rows)
+    rows = output_rows[:, : len(structure.pattern)] @ centre.basis
 
     groups = []
     enclosed = []
@@ -222,7 +150,7 @@ def mode_groups(structure: UndampedStructure, count: int | None) -> ModeGroups:
 
 
 def _group(
-    structure: UndampedStructure,
+    structure: Assembly[TaylorModel],
     used: Ints,
     modes: Ints,
     eigenvalue_block: TaylorModel,
@@ -238,14 +166,14 @@ def _group(
         sums: Sums over the modes for one source, the motion of the ground, without the factors, as
             functions of the used inputs or of all.
     """
-    factors = structure.output_factors
-    found = ModalSums(*(_of_all_inputs(x, structure, used) for x in sums))
+    factors = structure.row_factors
+    found = with_models(sums, lambda x: _of_all_inputs(x, structure, used))
     return ModeGroup(
         modes=modes,
         is_whole=True,
         eigenvalue_block=_of_all_inputs(eigenvalue_block, structure, used),
-        ratios=structure.damping_ratios[modes],
-        rayleigh=structure.rayleigh,
+        ratios=modal_ratios(structure)[modes],
+        rayleigh=stack(structure.rayleigh),
         sums=found._replace(
             products=found.products[0] * factors,
             products_over_eigenvalue=found.products_over_eigenvalue[0] * factors,
@@ -256,7 +184,7 @@ def _group(
 
 
 def _subspace(
-    structure: UndampedStructure, used: Ints, participation: BlockParticipation
+    structure: Assembly[TaylorModel], used: Ints, participation: BlockParticipation
 ) -> Subspace:
     """Return the subspace of a block of several modes as functions of all inputs.
 
@@ -272,9 +200,9 @@ def _subspace(
         solve(block, block.like(np.eye(len(block.remainder)))),
     )
     found = Subspace(*(_of_all_inputs(x, structure, used) for x in models))
-    return found._replace(output_modes=found.output_modes * structure.output_factors)
+    return found._replace(output_modes=found.output_modes * structure.row_factors)
 
 
-def _of_all_inputs(model: TaylorModel, structure: UndampedStructure, used: Ints) -> TaylorModel:
+def _of_all_inputs(model: TaylorModel, structure: Assembly[TaylorModel], used: Ints) -> TaylorModel:
     """Return a model of the used inputs, or of all, as a function of all, of their degree."""
     return model.truncated(structure.mass.order).embedded(used, structure.mass.inputs)

@@ -28,7 +28,6 @@ from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.taylor_model import (
     ORDER,
     TaylorModel,
-    all_on_subbox,
     concatenate,
 )
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -39,10 +38,11 @@ from alphacut.frame.modes.modal_model import (
     error_fractions,
     proved_error,
 )
+from alphacut.frame.modes.model_fields import on_subbox
 from alphacut.frame.records.history import History
-from alphacut.frame.response.chord_deviation import load_deviation
+from alphacut.frame.response.chord_deviation import Grid, load_deviation
 from alphacut.frame.response.load_tables import Direct
-from alphacut.frame.response.oscillators import Grid, Oscillators, Source, grid_over
+from alphacut.frame.response.oscillators import Oscillators, Source, grid_over
 from alphacut.frame.structures.loads import distinct_histories
 
 
@@ -116,35 +116,6 @@ class Oscillator:
     omega_range: Ends  # range of ω over the box, which may be narrower than that of the model
     quotient_range: Ends  # range of g/ω
 
-    @property
-    def models(self) -> list[TaylorModel]:
-        """All its models: ω, g, g/ω, c."""
-        return [self.omega, self.decay, self.quotient, self.participation]
-
-    def on_subbox(self, models: Sequence[TaylorModel]) -> Oscillator:
-        """Return the oscillator over a sub-box of the box of the inputs.
-
-        Its ranges are the intersections of those of the whole box with those of the models over the
-        sub-box.
-
-        Args:
-            models: Its models over the sub-box, four of them, in the order of the property
-                `models`: frequency ω, decay g and g/ω, scalars, and participation factors (sources,
-                m).
-
-        Raises:
-            ValueError: There are not four models.
-        """
-        omega, decay, quotient, participation = models
-        return Oscillator(
-            omega=omega,
-            decay=decay,
-            quotient=quotient,
-            participation=participation,
-            omega_range=overlap(range_of(omega), self.omega_range),
-            quotient_range=overlap(range_of(quotient), self.quotient_range),
-        )
-
     def table_cell(self, grid: Grid) -> Ints:
         """Return the first and last points of a grid that enclose ω, then g/ω, shape (4,)."""
         first, last = _enclosing_points(grid.omega, self.omega_range)
@@ -214,26 +185,21 @@ class Modes:
     def on_subbox(self, low: Array, high: Array) -> Modes:
         """Return the modes over the sub-box low ≤ u ≤ high, in its own unit coordinates.
 
-        What is left open stays that of the whole box, which is valid in the sub-box, too.
+        What is left open stays that of the whole box, which is valid in the sub-box, too. Ranges of
+        the oscillators are the intersections of those of the whole box with those of the models.
 
         Args:
             low: Lower ends, shape (d,), not below −1.
             high: Upper ends, shape (d,), not above 1.
         """
-        models = [x for mode in self.oscillators for x in mode.models]
-        for modes in self.truncated:
-            models += [modes.participation, modes.amplitude]
-        restricted = iter(all_on_subbox(models, low, high))  # in the same order
+        restricted = on_subbox(self, low, high)
         oscillators = []
-        for mode in self.oscillators:
-            own_models = [next(restricted) for _ in mode.models]
-            oscillators.append(mode.on_subbox(own_models))
-        truncated = []
-        for modes in self.truncated:
-            participation = next(restricted)
-            amplitude = next(restricted)
-            truncated.append(replace(modes, participation=participation, amplitude=amplitude))
-        return replace(self, oscillators=oscillators, truncated=truncated)
+        for mode in restricted.oscillators:
+            omega_range = overlap(range_of(mode.omega), mode.omega_range)
+            quotient_range = overlap(range_of(mode.quotient), mode.quotient_range)
+            narrower = replace(mode, omega_range=omega_range, quotient_range=quotient_range)
+            oscillators.append(narrower)
+        return replace(restricted, oscillators=oscillators)
 
     def interpolation_error(self) -> Array:
         """Bound the distance of outputs from a straight line within each time step, shape (T, m).

@@ -21,7 +21,7 @@ from alphacut.base.arrays import Array, Ints
 from alphacut.frame.calculus.taylor_model import ORDER, TaylorModel, solve
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.records.history import History
-from alphacut.frame.response.chord_deviation import line_deviations, load_deviation
+from alphacut.frame.response.chord_deviation import Grid, line_deviations, load_deviation
 from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.structures.linear import (
     Assembly,
@@ -126,9 +126,6 @@ def classical_structure(
     displacement_rows, velocity_rows = _constant_rows(assembly)
     takes_velocity = velocity_rows.any(axis=1)
     takes_acceleration = assembly.accelerated.any(axis=1)
-    ratios = assembly.ratios or [assembly.rayleigh[0] * 0.0]
-    if len(ratios) == 1:
-        ratios = ratios * len(assembly.massive)
     return ClassicalStructure(
         mass=assembly.mass,
         stiffness=assembly.stiffness,
@@ -137,10 +134,18 @@ def classical_structure(
         derivative_orders=np.where(takes_acceleration, 2, takes_velocity.astype(int)),
         initial_state=stack([displacements, velocities]).T,
         ground_pattern=assembly.pattern,
-        rayleigh=stack(list(assembly.rayleigh)),
-        damping_ratios=stack(ratios),
+        rayleigh=stack(assembly.rayleigh),
+        damping_ratios=modal_ratios(assembly),
         force_accelerations=force_accelerations,
     )
+
+
+def modal_ratios(assembly: Assembly[TaylorModel]) -> TaylorModel:
+    """Return the damping ratio of each mode with mass by rising frequency, shape (modes,)."""
+    ratios = assembly.ratios or [assembly.rayleigh[0] * 0.0]
+    if len(ratios) == 1:
+        ratios = ratios * len(assembly.massive)
+    return stack(ratios)
 
 
 def with_classical_damping(assembly: Assembly[TaylorModel]) -> Assembly[TaylorModel]:
@@ -385,8 +390,9 @@ class PointModes:
                 factor = np.abs(self.outputs[0, :, k] * self.starts[0, k, wave])
                 if factor.any():
                     # The bound divides by the frequency: a real σ is moved by 1e-9 of it.
-                    moved = complex(sigma.real, max(sigma.imag, 1e-9 * abs(sigma)))
-                    deviation = line_deviations(np.array([[moved]]), load, time, (0,))[0]
+                    omega = np.array([max(sigma.imag, 1e-9 * abs(sigma))])
+                    grid = Grid(omega, -sigma.real / omega)
+                    deviation = line_deviations(grid, load, time, (0,))[0]
                     error += np.outer(deviation[0], factor)
         for force, feed in zip(self.forces, self.feeds[0].T, strict=True):
             error += np.outer(load_deviation(force, time), np.abs(feed))

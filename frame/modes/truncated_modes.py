@@ -31,6 +31,7 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.frame.calculus.taylor_model import TaylorModel, solution_series, solve
 from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.modes.blocks import eigenvalue_discs
 from alphacut.frame.modes.clusters import (
     BlockParticipation,
     DampedRanges,
@@ -38,6 +39,7 @@ from alphacut.frame.modes.clusters import (
     column_products,
     damped_ranges,
 )
+from alphacut.frame.modes.model_fields import with_models
 from alphacut.frame.modes.modes import Excitation, TruncatedModes
 from alphacut.frame.modes.structure import ClassicalStructure
 from alphacut.frame.response.oscillators import (
@@ -45,6 +47,7 @@ from alphacut.frame.response.oscillators import (
     Ranges,
     Source,
     grid_over,
+    intervals,
     response_ranges,
 )
 
@@ -294,7 +297,7 @@ def _weighted_sums(
     """
     inputs = structure.initial_state.inputs
     order = structure.initial_state.order
-    all_sums = ModalSums(*(x.truncated(order).embedded(found.used, inputs) for x in sums))
+    all_sums = with_models(sums, lambda x: x.truncated(order).embedded(found.used, inputs))
     factors = structure.output_factors
     without = _root_of_product(all_sums.output_squares, all_sums.source_squares)
     over_eigenvalue = _root_of_product(
@@ -384,7 +387,6 @@ class CouplingBounds(NamedTuple):
 def coupling_bounds(
     structure: ClassicalStructure,
     participation: BlockParticipation,
-    found: Subspaces,
     excitation: Excitation,
 ) -> CouplingBounds:
     """Bound what couples the oscillators of a block of several modes.
@@ -396,7 +398,6 @@ def coupling_bounds(
     Args:
         structure: The structure over the box, with m outputs.
         participation: The block and how it takes part in the response.
-        found: All enclosed modes, with ranges of their eigenvalues.
         excitation: T time nodes and sources.
 
     Returns:
@@ -409,17 +410,16 @@ def coupling_bounds(
     """
     time, sources = excitation
     factors = _coupling_factors(structure, participation)
-    low, high = _eigenvalue_range(participation, found, factors.off_diagonal)
-    ranges = damped_ranges(structure, low, high, participation.block.modes)
+    low, high = eigenvalue_discs(participation.block.eigenvalue_block)
+    modes = participation.block.modes
+    ranges = damped_ranges(structure, float(low.min()), float(high.max()), modes)
     low_omega, high_omega = ranges.omega
-    min_quotient, max_quotient = ranges.quotient
+    _, max_quotient = ranges.quotient
 
-    # The distance of the table's points is a fifth of the decay or of the inverse duration, over
-    # which responses hardly change; 120 points along an axis at most limit the time.
-    spacing = 0.2 * (min_quotient * low_omega + 2 / max(float(time[-1]), 1e-300))
-    along_omega = (high_omega - low_omega) / spacing
-    along_quotient = (max_quotient - min_quotient) * high_omega / spacing
-    points = int(np.clip(along_omega, 1, 120)) + 1, int(np.clip(along_quotient, 1, 120)) + 1
+    # Over a fifth of the distance responses hardly change; 120 points along an axis at most limit
+    # the time.
+    along, across = np.clip(intervals(*ranges, time, fraction=0.2), 1, 120).astype(int) + 1
+    points = int(along), int(across)
     orders = structure.distinct_orders
     table = Oscillators(grid_over(*ranges, points), time, orders)
 
@@ -456,7 +456,6 @@ class _CouplingFactors(NamedTuple):
     by_slope: Array  # bound of the coupling over sup |de/dλ|, (sources, m)
     # bound of |a N^-½| |N^½ β|, and of Σ |a_j β_j|, which may be larger, (sources, m)
     by_line: Array
-    off_diagonal: Array  # bound of |F|, L off its diagonal, (p, p)
 
 
 def _coupling_factors(
@@ -471,9 +470,7 @@ def _coupling_factors(
 
     Returns:
         `by_slope`, a bound of the coupling divided by sup |de/dλ| of responses e, shape (sources,
-        m); `by_line`, a bound of |a N^-½| |N^½ β| and of Σ |a_j β_j|, shape (sources, m); and
-        `off_diagonal`, a bound of |L| off its diagonal, with zeros on it, shape (p, p), transposed
-        as the block holds L.
+        m); and `by_line`, a bound of |a N^-½| |N^½ β| and of Σ |a_j β_j|, shape (sources, m).
 
     Raises:
         UnprovedError: N may be singular in the box.
@@ -497,35 +494,7 @@ def _coupling_factors(
     return _CouplingFactors(
         by_slope=by_source[:, np.newaxis] * outputs,
         by_line=of_sources[:, np.newaxis] * outputs,
-        off_diagonal=off_diagonal,
     )
-
-
-def _eigenvalue_range(
-    participation: BlockParticipation, found: Subspaces, off_diagonal: Array
-) -> tuple[float, float]:
-    """Return a range over the box of the eigenvalues of a block and of the diagonal of its L.
-
-    The eigenvalues lie in Gershgorin's discs about L_jj, whose radii are sums of |F|, L off its
-    diagonal, and within the bounds by Rayleigh quotients in `found`.
-
-    Args:
-        participation: The block, K X = M X L of p modes.
-        found: Ranges `eigenvalue_low` and `eigenvalue_high` of every mode, shape (modes,), in 1/s².
-        off_diagonal: Bound of |Fᵀ|, shape (p, p), with zeros on the diagonal.
-
-    Returns:
-        Lower and upper end, in 1/s².
-    """
-    block = participation.block
-    j = np.arange(len(off_diagonal))
-    low, high = block.eigenvalue_block[j, j].bounds()
-    radius = off_diagonal.sum(axis=1)
-    eigenvalue_low = max(float((low - radius).min()), float(found.eigenvalue_low[block.modes[0]]))
-    eigenvalue_high = min(
-        float((high + radius).max()), float(found.eigenvalue_high[block.modes[-1]])
-    )
-    return min(eigenvalue_low, float(low.min())), max(eigenvalue_high, float(high.max()))
 
 
 def _largest_within_steps(

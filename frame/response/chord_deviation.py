@@ -15,7 +15,7 @@ These bounds add modes by magnitude.
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import comb, perm, prod
 from typing import NamedTuple
 
@@ -24,6 +24,42 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.frame.records.history import History
 from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Points of a box of frequencies ω, shape (W,), in rad/s, and quotients q = g/ω, shape (Q,)."""
+
+    omega: Array  # rising
+    quotient: Array  # rising
+
+    @property
+    def sigma(self) -> Array:
+        """σ = −g + iω at all points, shape (Q, W)."""
+        return np.asarray((-self.quotient[:, None] + 1j) * self.omega)
+
+    @property
+    def decay(self) -> float:
+        """The smallest decay g."""
+        return float((self.quotient[:, None] * self.omega).min())
+
+    @property
+    def distances(self) -> tuple[float, float]:
+        """The largest distances of neighbouring points, h along ω and k along q; 0 for one."""
+        h = np.diff(self.omega).max(initial=0.0)
+        return float(h), float(np.diff(self.quotient).max(initial=0.0))
+
+    @property
+    def between(self) -> float:
+        """Factor b: a function F of σ differs from interpolation by at most b sup|F″|.
+
+        The interpolation is bilinear in q and ω between the points. Along an axis of length h it
+        errs by h²/8 times the second derivative along it. Since σ = (−q + i) ω is linear in ω and
+        in q, this is |F″| |dσ/dω|² = |F″| (1 + q²), and |F″| |dσ/dq|² = |F″| ω²; the error along
+        both axes is at most the sum.
+        """
+        h, k = self.distances
+        return float(((1 + self.quotient[-1] ** 2) * h**2 + (self.omega[-1] * k) ** 2) / 8)
 
 
 class Pieces(NamedTuple):
@@ -170,27 +206,6 @@ def _fourth_off_chords(
     return np.asarray(h**2 / 8 * fourth_derivative(order + 2, fast, growth * np.array(within)))
 
 
-def _between_points(sigma: Array) -> float:
-    """Return b such that a function F of σ differs by at most b sup|F″| from interpolation.
-
-    The interpolation is bilinear in q = g/ω and ω between the points of a grid, σ = −g + iω: b =
-    (|dσ/dω|² h_ω² + |dσ/dq|² h_q²)/8 with the largest distances h of neighbouring points.
-
-    Args:
-        sigma: Points of the grid, shape (Q, W); row by row of q, with ω along each row, in any
-            order. A grid of one point gives 0.
-    """
-    # Linear interpolation along an axis of length h errs by h²/8 times the second derivative along
-    # it. Since σ = (−q + i) ω is linear in ω and in q, this is |F″| |dσ/dω|² = |F″| (1 + q²), and
-    # |F″| |dσ/dq|² = |F″| ω²; the error along both axes is at most the sum.
-    omega = sigma[0].imag
-    quotient = -sigma[:, 0].real / sigma[:, 0].imag
-    h_omega = float(np.diff(np.sort(omega)).max(initial=0.0))
-    h_quotient = float(np.diff(np.sort(quotient)).max(initial=0.0))
-    along_omega = (1 + quotient.max() ** 2) * h_omega**2
-    return float((along_omega + (omega.max() * h_quotient) ** 2) / 8)
-
-
 def _batches(nodes: int, points: int) -> list[slice]:
     """Return slices of points of σ whose responses at all nodes fit in a million numbers."""
     # A complex number takes 16 bytes, and a response has two derivatives: 16 MB, which is tuned to
@@ -200,22 +215,8 @@ def _batches(nodes: int, points: int) -> list[slice]:
     return [slice(first, first + size) for first in range(0, points, size)]
 
 
-class _Largest:
-    """Largest magnitudes over the grid of what a power of σ makes of ρ, for `line_deviations`.
-
-    Attributes:
-        amplitude: |F| and |F″| of F = σ^order A, shape (2, P) for P segments.
-        off: Of H, which is σ^order ρ less the chord of the step: |H|, |H″| and |Im H/ω|, shape (3,
-            N).
-    """
-
-    def __init__(self, segments: int) -> None:
-        self.amplitude = np.zeros((2, segments))
-        self.off = np.zeros((3, segments + 1))
-
-
 def line_deviations(
-    sigma: Array,
+    grid: Grid,
     load: History | None,
     time: Array,
     orders: Collection[int],
@@ -225,8 +226,7 @@ def line_deviations(
     """Return bounds of the distance of σ^order ρ, and of its imaginary part over ω, from chords.
 
     Args:
-        sigma: Points −g + iω of a grid over q = g/ω and ω that covers the oscillators, shape
-            (Q, W).
+        grid: Covers the oscillators.
         load: The load; None for ρ = exp(σ t).
         time: Time nodes, shape (T,), in s.
         orders: Powers of σ.
@@ -237,10 +237,10 @@ def line_deviations(
         For each order bounds in the step that ends at each node, shape (2, T): of the modulus, then
         of the imaginary part over ω.
     """
-    omega = sigma[0].imag
-    low = float(omega.min())
+    sigma = grid.sigma.ravel()
+    low = float(grid.omega[0])
     fast = float(np.abs(sigma).max())
-    decay = float(-sigma.real.max())
+    decay = grid.decay
     pieces = _pieces(load, time, fast)
     times = pieces.time
     d = np.diff(times)
@@ -255,9 +255,12 @@ def line_deviations(
     else:
         bounds = at_nodes[1]
 
-    largest = {order: _Largest(len(d)) for order in orders}
+    # Largest magnitudes over the grid: |F| and |F″| of F = σ^order A at the beginnings of segments,
+    # and of H, which is σ^order ρ less the chord of the step: |H|, |H″| and |Im H/ω|.
+    amplitudes = {order: np.zeros((2, len(d))) for order in orders}
+    off = {order: np.zeros((3, len(times))) for order in orders}
     for batch in _batches(len(times), sigma.size):
-        points = sigma.ravel()[batch]
+        points = sigma[batch]
         if at_nodes is None:
             rho = responses_of(points, load, times)
         else:
@@ -267,17 +270,17 @@ def line_deviations(
             A = A + _of_line(points, pieces.first, slope)
         for order in orders:
             F, _, F2 = with_power(points, A, order)
-            _raise_to(largest[order].amplitude, F, F2)
+            _raise_to(amplitudes[order], F, F2)
         if not is_inside.any():
             continue
         off_chords = chords.deviations(rho)
         for order in orders:
             H, _, H2 = with_power(points, off_chords, order)
-            _raise_to(largest[order].off, H, H2, H.imag / points.imag)
+            _raise_to(off[order], H, H2, H.imag / points.imag)
 
     # between the points of the grid F differs from bilinear interpolation by `between` |F″|
-    h_omega = float(np.diff(np.sort(omega)).max(initial=0.0))
-    between = _between_points(sigma)
+    h_omega, _ = grid.distances
+    between = grid.between
     growth = np.exp(max(-decay, 0.0) * d)
     found = dict[int, Array]()
     for order in orders:
@@ -285,13 +288,13 @@ def line_deviations(
         fourth = fourth_derivative(order, fast, bounds)
         of_line = abs(prod(range(order - 4, order))) * np.abs(pieces.first) * low ** (order - 5)
         of_line += abs(prod(range(order - 5, order - 1))) * np.abs(slope) * low ** (order - 6)
-        amplitude, second = largest[order].amplitude
+        amplitude, second = amplitudes[order]
         amplitude = amplitude + between * (second + between * (fourth[:-1] + of_line))
         # within a segment: A exp(σ τ), and the load's distance from a line
         curved = growth * np.minimum((fast * d) ** 2 / 8, 2.0) * amplitude
         curved += growth * fast**order * 2 * d * pieces.bend
         # at the ends of segments: H, and its imaginary part
-        modulus, second, imaginary = largest[order].off
+        modulus, second, imaginary = off[order]
         of_steps = _fourth_off_chords(order, decay, fast, load, bounds[:, node[:-1]], np.diff(time))
         of_chords = np.append(np.repeat(of_steps, np.diff(node)), 0.0)
         fourth_off = np.minimum(chords.with_ends(fourth), of_chords)

@@ -32,6 +32,7 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.frame.records.history import History
 from alphacut.frame.response.chord_deviation import (
+    Grid,
     fourth_derivative,
     line_deviations,
     moments_of,
@@ -101,19 +102,6 @@ class ModalResponses:
     largest: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Grid:
-    """Points of a box of frequencies ω, shape (W,), in rad/s, and quotients q = g/ω, shape (Q,)."""
-
-    omega: Array
-    quotient: Array
-
-    @property
-    def sigma(self) -> Array:
-        """σ at all points, shape (Q, W)."""
-        return np.asarray((-self.quotient[:, None] + 1j) * self.omega)
-
-
 def grid_over(
     omega: tuple[float, float], quotient: tuple[float, float], points: tuple[int, int]
 ) -> Grid:
@@ -139,6 +127,26 @@ def grid_over(
         np.asarray(np.linspace(lowest_omega, highest_omega, along_omega), float),
         np.asarray(np.linspace(lowest_quotient, highest_quotient, along_quotient), float),
     )
+
+
+def intervals(
+    omega: tuple[float, float], quotient: tuple[float, float], time: Array, *, fraction: float
+) -> tuple[float, float]:
+    """Return numbers of intervals along ω and along q = g/ω that suffice between points of a grid.
+
+    A response changes over a distance in σ = −g + iω of about the decay g, which is the width of
+    the peak of the frequency response, or of the inverse duration where that is larger.
+
+    Args:
+        omega: Lower and upper end of ω, in rad/s, positive.
+        quotient: Lower and upper end of q.
+        time: Time nodes, shape (T,), in s.
+        fraction: Distance of points as a fraction of this distance.
+    """
+    low, high = omega
+    smallest, largest = quotient
+    spacing = fraction * (max(smallest, 0.0) * low + 2 / max(float(time[-1]), 1e-300))
+    return (high - low) / spacing, (largest - smallest) * high / spacing
 
 
 class _Table(NamedTuple):
@@ -172,7 +180,6 @@ class Oscillators:
         sigma = grid.sigma.ravel()
         duration = float(time[-1])
         require_in_range(sigma, duration, duration)
-        self.decay = float((grid.quotient[:, None] * grid.omega).min())
         self._tables = dict[History | None, _Table]()
 
     def _table(self, load: History | None) -> _Table:
@@ -186,7 +193,7 @@ class Oscillators:
             derivatives of orders 0 to 4 over the grid (5, T).
         """
         if load not in self._tables:
-            bounds = moments_of(self.decay, load, self.time)
+            bounds = moments_of(self.grid.decay, load, self.time)
             rho = responses_of(self.grid.sigma.ravel(), load, self.time)
             self._tables[load] = _Table(rho, bounds)
         return self._tables[load]
@@ -239,14 +246,12 @@ class Oscillators:
         low = self.grid.omega[0]
         high = self.grid.omega[-1]
         q = self.grid.quotient[-1]
-        h = np.diff(self.grid.omega).max(initial=0.0)
-        k = np.diff(self.grid.quotient).max(initial=0.0)
+        h, k = self.grid.distances
         # along ω at constant q, dσ = (−q + i) dω; along q, dσ = −ω dq
         stretch = 1 + q**2  # |dσ/dω|²
         fourth = fourth_derivative(order, high * stretch**0.5, bounds)
-        # A function F of σ differs from bilinear interpolation by at most `between` sup|F″|, and
-        # every point of a cell is at most √(2 between), half the diagonal, from a corner.
-        between = (stretch * h**2 + high**2 * k**2) / 8
+        # Every point of a cell is at most √(2 between), half the diagonal, from a corner.
+        between = self.grid.between
         second = largest[2] + between * fourth
         first = largest[1] + np.sqrt(2 * between) * second
         zero = largest[0] + between * second
@@ -271,7 +276,7 @@ class Oscillators:
         """
         if source.load not in self._deviations:
             self._deviations[source.load] = line_deviations(
-                self.grid.sigma,
+                self.grid,
                 source.load,
                 self.time,
                 self.orders,
@@ -423,18 +428,13 @@ def _tables_of_piece(
     Returns:
         None where more than 240 points along ω would be needed.
     """
-    # A response changes over a distance in σ of about the decay or the inverse duration. Points
-    # are .4 of it apart; tighter ones cost memory, wider ones are no better than the integral.
-    # More than 240 points along ω, or 8 along q, cost more than the tighter bound is worth. All
-    # three numbers are tuned.
-    slowest, fastest = omega
-    decay = quotient[0] * slowest
-    distance = 0.4 * (decay + 2 / max(float(time[-1]), 1e-300))
-    along = int(np.ceil((fastest - slowest) / distance)) + 1
-    across = int(np.ceil((quotient[1] - quotient[0]) * fastest / distance)) + 1
+    # With a smaller fraction than .4 points cost memory, with a larger one tables are no better
+    # than the integral. More than 240 points along ω, or 8 along q, cost more than the tighter
+    # bound is worth. All three numbers are tuned.
+    along, across = np.ceil(intervals(omega, quotient, time, fraction=0.4)) + 1
     if along > 240:
         return None
-    points = (max(along, 2), int(np.clip(across, 2, 8)))
+    points = (max(int(along), 2), int(np.clip(across, 2, 8)))
     return Oscillators(grid_over(omega, quotient, points), time, orders)
 
 

@@ -187,7 +187,8 @@ def test_wide_bounds_of_a_proof_get_peaks_that_are_followed_inside_them(monkeypa
     at = np.broadcast_to(nominal, close.upper_at.shape)
     wide = replace(close, inner=close.inner._replace(lower=reached, upper=reached),
                    upper=close.upper + more, lower=close.lower - more,
-                   lower_at=at, upper_at=at)  # fmt: skip
+                   lower_at=at, upper_at=at,
+                   facts={**close.facts, "gap_of_peaks": 1.0})  # fmt: skip
     monkeypatch.setattr(frame.DualProof, "run", lambda *_: wide)
     monkeypatch.setattr(frame.Proof, "run", lambda *_: wide)
     found = envelope(system, inputs, frame.Auto(), **MOTION | {"relative": False})

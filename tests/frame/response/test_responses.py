@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Accelerogram, History, UnprovedError
-from alphacut.frame.response.chord_deviation import line_deviations, load_deviation
+from alphacut.frame.response.chord_deviation import Grid, line_deviations, load_deviation
 from alphacut.frame.response.duhamel import (
     FROM_RECURRENCE,
     absolute_moments,
@@ -19,7 +19,7 @@ from alphacut.frame.response.duhamel import (
     step_integrals,
 )
 from alphacut.frame.response.load_tables import LoadTable
-from alphacut.frame.response.oscillators import Grid, Oscillators, Source, grid_over
+from alphacut.frame.response.oscillators import Oscillators, Source, grid_over
 from tests.frame import test_forces
 
 UNIT = 2.0**-53
@@ -291,8 +291,8 @@ def off_chords(sigma, load, order, kappa):
 @pytest.mark.parametrize("load", LOADS)
 def test_a_mode_alone_strays_as_far_as_its_magnitude_says(load, order, rng):
     """Also while a load has hardly moved it yet."""
-    sigma = grid_over((omega := rng.uniform(5, 30),) * 2, (0.05, 0.05), (4, 2)).sigma
-    bound = line_deviations(sigma, LOADS[load], TIME, (order,))[order][1, 1:]
+    grid = grid_over((omega := rng.uniform(5, 30),) * 2, (0.05, 0.05), (4, 2))
+    bound = line_deviations(grid, LOADS[load], TIME, (order,))[order][1, 1:]
     off = off_chords(np.array([-0.05 + 1j]) * omega, LOADS[load], order, 1 / (1j * omega))
     assert (off <= bound * (1 + 1e-9) + 1e-15).all()
 
@@ -300,11 +300,11 @@ def test_a_mode_alone_strays_as_far_as_its_magnitude_says(load, order, rng):
 def test_bounds_over_a_coarse_grid_fall_with_the_step_where_samples_lie_within(rng):
     load = History(0.001, rng.normal(size=3000).cumsum())
     omega, quotient = (100.0, 140.0), (0.05, 0.15)
-    sigma = grid_over(omega, quotient, (24, 3)).sigma
+    grid = grid_over(omega, quotient, (24, 3))
     bounds = []
     for step in (0.016, 0.004):
         time = step * np.arange(round(3 / step) + 1)
-        bounds.append(line_deviations(sigma, load, time, (0,))[0][1].max())
+        bounds.append(line_deviations(grid, load, time, (0,))[0][1].max())
         fine = np.linspace(0, time[-1], 8 * len(time) - 7)
         w, q = rng.uniform(*omega, 5), rng.uniform(*quotient, 5)
         rho = responses_at_nodes((-q + 1j) * w, load, fine, 0)[0]
@@ -329,8 +329,8 @@ def test_resonance_between_two_points_of_a_grid_is_in_the_bound(order, samples_i
     load = History(step, samples)
     # at the end the response at the grid's frequencies has beaten down to almost nothing
     width = rng.uniform(0.9, 1.05) * 2 * np.pi / (TIME[-1] * middle)
-    sigma = grid_over((middle * (1 - width), middle * (1 + width)), (0.0, 0.0), (2, 1)).sigma
-    bound = line_deviations(sigma, load, TIME, (order,))[order][1, 1:]
+    grid = grid_over((middle * (1 - width), middle * (1 + width)), (0.0, 0.0), (2, 1))
+    bound = line_deviations(grid, load, TIME, (order,))[order][1, 1:]
     fine = np.linspace(TIME[0], TIME[-1], PARTS * (len(TIME) - 1) + 1)
     for omega in middle * np.linspace(1 - width, 1 + width, 11):
         sigma = np.array([1j * omega])
@@ -355,8 +355,8 @@ def test_what_a_response_is_between_points_at_which_it_and_its_curvature_vanish(
     """Nothing is read at the two frequencies of the grid: its fourth derivative alone bounds it."""
     omega, width, step = rng.uniform(15, 25), rng.uniform(0.05, 0.15), TIME[1] - TIME[0]
     ends = omega * np.array([1 - width, 1 + width])
-    sigma = grid_over(tuple(ends), (0.0, 0.0), (2, 1)).sigma
-    points = 1j * np.array([*sigma[0].imag, omega])
+    grid = grid_over(tuple(ends), (0.0, 0.0), (2, 1))
+    points = 1j * np.array([*grid.omega, omega])
     columns = []
     for sample in np.eye(len(TIME)):
         load = History(step, sample)
@@ -373,7 +373,7 @@ def test_what_a_response_is_between_points_at_which_it_and_its_curvature_vanish(
     rho = responses_at_nodes(points[2:], load, np.append(TIME[:-2], fine), 0)[0, -41:, 0]
     off = np.abs(rho - np.linspace(rho[0], rho[-1], 41)).max()
     assert off > 1e-6 * np.abs(rho).max()
-    assert off <= line_deviations(sigma, load, TIME, (0,))[0][0, -1]
+    assert off <= line_deviations(grid, load, TIME, (0,))[0][0, -1]
 
 
 def test_the_bend_of_a_harmonic_force_counts_where_its_pieces_end_on_the_line(rng):
