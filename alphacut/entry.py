@@ -15,7 +15,6 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any
 
 from alphacut.base.errors import FailedError, RefusedError
 from alphacut.commands.options import Command, Parser, require_petsc, split_petsc
@@ -49,9 +48,6 @@ exit status:
 class ShowVersion(argparse.Action):
     """Option that prints the version, which takes time to find, and ends the process."""
 
-    def __init__(self, **names: Any) -> None:
-        super().__init__(nargs=0, **names)
-
     def __call__(self, parser: argparse.ArgumentParser, *_: object, **__: object) -> None:
         """Print the version, and raise SystemExit."""
         print(f"alphacut {own_version()}")
@@ -59,13 +55,14 @@ class ShowVersion(argparse.Action):
 
 
 def build_parsers(
-    program: str, commands: Mapping[str, Command]
+    program: str, commands: Mapping[str, Command], words: Sequence[str]
 ) -> tuple[Parser, dict[str, Parser]]:
     """Return the parser of a program, and the parser of each of its commands by name.
 
     Args:
         program: Name of the program, for its texts.
         commands: Its commands by name.
+        words: Words of the command line. Commands that are none of them get no options.
     """
     parser = Parser(
         prog=program,
@@ -74,7 +71,7 @@ def build_parsers(
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument("--version", action=ShowVersion, help="show the version and exit")
+    parser.add_argument("--version", action=ShowVersion, nargs=0, help="show the version and exit")
     subparsers = parser.add_subparsers(
         dest="command", metavar="COMMAND", required=True, parser_class=Parser
     )
@@ -85,7 +82,8 @@ def build_parsers(
         of_command = subparsers.add_parser(
             name, help=command.about, description=about, allow_abbrev=False
         )
-        command.arguments(of_command)
+        if name in words:
+            command.arguments(of_command)
         of_command.set_defaults(run=command.run)
         shown = "log what is done; a traceback with every error"
         of_command.add_argument(DEBUG, action="store_true", help=shown)
@@ -241,7 +239,7 @@ def _run_command(arguments: Sequence[str], program: str, commands: Mapping[str, 
             the command itself leave this function as well.
     """
     words, petsc = split_petsc(arguments)
-    parser, by_name = build_parsers(program, commands)
+    parser, by_name = build_parsers(program, commands, words)
     options, unknown = parser.parse_known_args(words)
     if unknown:
         # Values of an unknown option are unknown words as well: the option is named.

@@ -27,7 +27,8 @@ def _stage(name: str) -> str:
     """Return the name of a stage, if it is one; those of analyses are registered."""
     of_analyses = [analysis.stage for analysis in ANALYSES.values()]
     known = list(dict.fromkeys(["microstructure", "modulus", "envelope", *of_analyses]))
-    require(name in known, "", f'"{name}"', ", ".join(known), suggestion(name, known))
+    if name not in known:
+        raise RefusedError("", f'"{name}"', ", ".join(known), suggestion(name, known))
     return name
 
 
@@ -77,11 +78,6 @@ class CellContent(Section, defer_build=True):
         return float(self.particle_cell.fraction.nominal)
 
     @property
-    def mesh_cell(self) -> MeshedCell | None:
-        """The cell if its mesh comes from a file."""
-        return self.cell if isinstance(self.cell, MeshedCell) else None
-
-    @property
     def radius_map(self) -> RadiusMapSection | None:
         """The radius map of [radius], if there is one."""
         return self.radius if isinstance(self.radius, RadiusMapSection) else None
@@ -102,19 +98,19 @@ class CellContent(Section, defer_build=True):
             RefusedError: The cell is an image or missing, or a particle has neither [radius] nor a
                 fraction.
         """
-        if self.mesh_cell is not None:
-            return self.radius or ThetaSection(), self.mesh_cell
+        if isinstance(self.cell, MeshedCell):
+            return self.radius or ThetaSection(), self.cell
         allowed = "a section [cell] with a particle"
         # An image has no random θ: bounds of its stiffness need no samples.
-        if self.image_cell is not None:
+        if isinstance(self.cell, ImageCell):
             cure = f"run {command_to_paste('modulus', 'CASE.toml')}"
             raise RefusedError("cell", "an image", allowed, cure)
-        if self.particle_cell is None:
+        if self.cell is None:
             raise RefusedError("cell", None, allowed)
-        radius = self.radius_map or self.particle_cell.fraction_map
+        radius = self.radius_map or self.cell.fraction_map
         if radius is None:
             raise RefusedError("radius", None, "a section [radius], or cell.fraction")
-        return radius, self.particle_cell
+        return radius, self.cell
 
     def require_consistent(self) -> None:
         """Refuse sections that do not fit each other."""
@@ -135,17 +131,18 @@ class CellContent(Section, defer_build=True):
         """
         if self.mesh.file is None:
             allowed = "a mesh of Gmsh beside [cell.phases]"
-            require(self.mesh_cell is None, "mesh.file", None, allowed)
+            require(not isinstance(self.cell, MeshedCell), "mesh.file", None, allowed)
             for key in ("refine", "bounds"):
                 is_meant = not getattr(self.mesh, key)
                 require(is_meant, f"mesh.{key}", True, "true beside mesh.file")
             # `radius_map` is [radius] if it has a1 … a4, else None.
-            is_complete = self.radius is None or self.radius_map is not None
-            about = RadiusMapSection.described_fields()["a1"].description
-            require(is_complete, "radius.a1", None, f"{about}; theta alone beside mesh.file")
+            if self.radius is not None and self.radius_map is None:
+                about = RadiusMapSection.described_fields()["a1"].description
+                allowed = f"{about}; theta alone beside mesh.file"
+                raise RefusedError("radius.a1", None, allowed)
             return
         allowed = "[cell.phases], a phase for each physical group of mesh.file"
-        require(self.mesh_cell is not None, "cell.phases", None, allowed)
+        require(isinstance(self.cell, MeshedCell), "cell.phases", None, allowed)
         # The file has its own elements and its own shape of particles. Keys that a run would
         # ignore are refused, since their author expects them to act.
         for key in ("size", "layers"):
@@ -174,9 +171,12 @@ class CellContent(Section, defer_build=True):
         """
         # The radius comes from one source: a stage, a fraction of equal particles, or [radius].
         # Of two sources one would silently win.
-        has_fraction = self.particle_cell is not None and self.particle_cell.fraction is not None
+        particle = self.particle_cell
+        has_fraction = particle is not None and particle.fraction is not None
         is_computed = "microstructure" in self.stages
-        needs_radius = not (is_computed or has_fraction or self.image_cell or self.mesh_cell)
+        needs_radius = not (
+            is_computed or has_fraction or isinstance(self.cell, ImageCell | MeshedCell)
+        )
         needed = {"modulus": ("radius", "cell") if needs_radius else ("cell",)}
         for stage in self.stages:
             # An empty section is there: its keys have defaults, or are told as missing.
@@ -187,9 +187,9 @@ class CellContent(Section, defer_build=True):
         require_alone("radius", has_radius and is_computed, "stage microstructure")
         require_alone("radius", has_radius and has_fraction, "cell.fraction")
         require_alone("cell.fraction", has_fraction and is_computed, "stage microstructure")
-        if is_computed and self.particle_cell is not None:
+        if is_computed and particle is not None:
             # The radius of a particle is there over half the side of a square as large as its cell.
-            lattice = self.particle_cell.lattice
+            lattice = particle.lattice
             allowed = "square beside stage microstructure"
             cure = "give [radius] or cell.fraction for other arrays"
             require(lattice == "square", "cell.lattice", lattice, allowed, cure)

@@ -67,7 +67,7 @@ def parse(
     text = text_of(path)
     table = _parse_toml(path, text)
     model = model_of(table)
-    changed = apply_changes(model, table, changes)
+    changed = apply_changes(model, table, changes) if changes else ()
     try:
         content = model.model_validate(table, context={"folder": path.parent})
     except ValidationError as error:
@@ -288,8 +288,6 @@ def apply_changes(
     Raises:
         RefusedError: A change has no value, or its key is unknown or given before.
     """
-    if not changes:
-        return ()
     # Studies are entries of an array, which a key without an index does not tell apart.
     # Only sections that are named are made ready, which takes time.
     sections = {re.split("[.=]", change)[0].strip() for change in changes}

@@ -7,7 +7,7 @@ entry here; of another distribution, an entry point in the group "alphacut.struc
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from functools import cache, partial
 from typing import Annotated, Any, TypeVar, cast
 
@@ -74,21 +74,19 @@ def _whole_case(
             out, and is None then.
 
     """
-
-    def _fields_of(places: Mapping[str, str]) -> dict[str, Any]:
-        """Return the types of the fields of sections, with their defaults, by name."""
-        kinds: dict[str, Any] = dict.fromkeys(places, object)
+    fields: list[dict[str, Any]] = []  # of structures, and of analyses
+    for places in (structures, analyses):
+        kinds: dict[str, Any] = dict.fromkeys(dict(places), object)
         if built:
-            for name, place in places.items():
+            for name, place in places:
                 kinds[name] = Annotated[object, FirstUse(partial(_section_at, name, place))] | None
-        return {name: (kind, None) for name, kind in kinds.items()}
+        fields.append({name: (kind, None) for name, kind in kinds.items()})
 
     # Pydantic takes fields from the last base on: of the cell, of the structures, of the rest, and
     # at last those of analyses.
-    of_structures = create_model("Structures", __base__=CellContent, **_fields_of(dict(structures)))
+    of_structures = create_model("Structures", __base__=CellContent, **fields[0])
     bases: Any = (content, of_structures)
-    further = _fields_of(dict(analyses))
-    whole: type[CellContent] = create_model(content.__name__, __base__=bases, **further)
+    whole: type[CellContent] = create_model(content.__name__, __base__=bases, **fields[1])
     whole.__doc__ = content.__doc__
     return whole
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import itertools
 import math
 import re
 from collections.abc import Callable, Sequence
@@ -126,8 +125,20 @@ class Quantity(base.Quantity):
             RefusedError: The value is no such quantity, or it leaves the range at either end of its
                 support. The hint of the quantity, `cure`, is part of the message if it has one.
         """
+        number: FuzzyNumber | float | int
+        reason = "write a number without quotes and without a unit"
         try:
-            number = self._parsed(value)
+            # True is an int in Python, but no number in TOML.
+            if self.is_integer and isinstance(value, int) and not isinstance(value, bool):
+                number = value
+            elif self.is_integer:
+                raise ValueError(reason)
+            elif not self.si and isinstance(value, str) and "%" not in value and "[" not in value:
+                raise ValueError(f'{reason}, or "5 %" for 0.05')
+            elif self.fuzzy:
+                number = quantity.parse_fuzzy(value, self.si)
+            else:
+                number = quantity.parse_number(value, self.si)
         except ValueError as error:
             cure = str(error)
             if self.cure:
@@ -140,10 +151,9 @@ class Quantity(base.Quantity):
             ends.extend(number.support)
         else:
             ends.append(number)
-        is_inside = self.admits(min(ends), max(ends))
-        require(
-            is_inside, "", value, self.allowed, self.cure or self._cure_of_percentage(value, ends)
-        )
+        if not self.admits(min(ends), max(ends)):
+            cure = self.cure or self._cure_of_percentage(value, ends)
+            raise RefusedError("", value, self.allowed, cure)
         return number
 
     def _cure_of_percentage(self, value: object, ends: Sequence[float]) -> str:
@@ -167,25 +177,6 @@ class Quantity(base.Quantity):
         if is_number(value):
             return f'write "{value} %" or {ends[0] / 100:g}'
         return f'write "{value} %"'
-
-    def _parsed(self, value: object) -> FuzzyNumber | float | int:
-        """Return the quantity that a value states, in SI, whether or not it lies in the range.
-
-        Raises:
-            ValueError: The value is no such quantity. A whole number must stand without quotes, and
-                so must a number without a unit unless it has "%" or brackets.
-        """
-        # True is an int in Python, but no number in TOML.
-        if self.is_integer and isinstance(value, int) and not isinstance(value, bool):
-            return value
-        reason = "write a number without quotes and without a unit"
-        if self.is_integer:
-            raise ValueError(reason)
-        if not self.si and isinstance(value, str) and "%" not in value and "[" not in value:
-            raise ValueError(f'{reason}, or "5 %" for 0.05')
-        if self.fuzzy:
-            return quantity.parse_fuzzy(value, self.si)
-        return quantity.parse_number(value, self.si)
 
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler
@@ -242,7 +233,7 @@ NotEmpty = BeforeValidator(_not_empty)
 
 def rising(values: tuple[float, ...]) -> tuple[float, ...]:
     """The numbers as they are, if they rise strictly."""
-    is_rising = bool(values) and all(a < b for a, b in itertools.pairwise(values))
+    is_rising = bool(values) and list(values) == sorted(set(values))
     require(is_rising, "", list(values), "numbers in rising order")
     return values
 

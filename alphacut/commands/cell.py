@@ -10,9 +10,7 @@ from pathlib import Path
 from typing import NamedTuple, TextIO, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from alphacut.base.arrays import Array
 from alphacut.base.kept_files import whole_file
 from alphacut.base.number_text import range_text, text_table
 from alphacut.case.cell import CellCase
@@ -165,16 +163,15 @@ def document_of(result: HomogenisedStiffness) -> Document:
     document: Document = {"E_GPa": None, "nu": None}
     if result.has_isotropic_constants:
         document |= {"E_GPa": result.modulus / GPA, "nu": result.poisson}
-    document["stress_GPa"] = _stresses(curve.mean)
+    s11, s12 = np.asarray(curve.mean) / GPA
+    document["stress_GPa"] = {"s11": s11, "s12": s12}
     document["fibres"] = {}
     if result.is_of_fibres:
         fibres = fibre_constants(result)
         document["fibres"] = _constants(fibres.values, fibres.errors)
-    errors = None  # unless the model declares some
-    if result.errors:
-        errors = result.stiffness_errors
-    document["stiffness_GPa"] = _in_gpa(result.stiffness)
-    document["stiffness_error_GPa"] = _in_gpa(errors)
+    errors = result.stiffness_errors if result.errors else None
+    for key, moduli in (("stiffness_GPa", result.stiffness), ("stiffness_error_GPa", errors)):
+        document[key] = None if moduli is None else moduli / GPA
     document["plane"] = {
         definition: _constants(
             dict(zip(NAMES, constants.values, strict=True)),
@@ -195,13 +192,6 @@ def document_of(result: HomogenisedStiffness) -> Document:
     return document
 
 
-def _in_gpa(moduli: Array | None) -> Array | None:
-    """Return moduli in GPa from those in Pa; None where there are none."""
-    if moduli is None:
-        return None
-    return np.asarray(moduli / GPA, float)
-
-
 def _constants(values: Mapping[str, float], errors: Mapping[str, float]) -> Document:
     """Return value and error of each constant by its key: moduli in GPa, ratios as they are.
 
@@ -217,11 +207,6 @@ def _constants(values: Mapping[str, float], errors: Mapping[str, float]) -> Docu
             error = errors[name] / unit
         found[key] = {"value": value / unit, "error": error}
     return found
-
-
-def _stresses(values: ArrayLike) -> Document:
-    """Return σ11 and σ12 in GPa by name, from their values in Pa, shape (2,)."""
-    return dict(zip(("s11", "s12"), np.asarray(values) / GPA, strict=True))
 
 
 def declared_errors(result: HomogenisedStiffness) -> Document | None:
@@ -249,7 +234,8 @@ def declared_errors(result: HomogenisedStiffness) -> Document | None:
         # The mean σ11 is proportional to C11 + C12, and σ12 to C33. These are moduli 0 and 2 of the
         # plane, so that stresses have their relative errors.
         stresses = np.abs(result.curve.mean) * result.modulus_errors[[0, 2]]
-    return {"E_GPa": modulus / GPA, "nu": nu, "stress_GPa": _stresses(stresses)}
+    s11, s12 = np.asarray(stresses) / GPA
+    return {"E_GPa": modulus / GPA, "nu": nu, "stress_GPa": {"s11": s11, "s12": s12}}
 
 
 def summary(document: Document, convention: str) -> str:

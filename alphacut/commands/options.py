@@ -145,8 +145,8 @@ def require_petsc(petsc: Mapping[str, str], content: CellContent | None = None) 
     """
     # An option that nothing reads would look as if it acted.
     has_prisms = content is not None and (
-        content.mesh_cell is not None
-        or (content.particle_cell is not None and content.modulus.method == "prism")
+        content.mesh.file is not None
+        or (content.modulus.method == "prism" and content.particle_cell is not None)
     )
     option = PETSC_PREFIX + next(iter(petsc), "")
     require(has_prisms or not petsc, option, "PETSc's", "options of a cell with method prism")

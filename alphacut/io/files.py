@@ -27,21 +27,13 @@ def rank() -> int:
     # Open MPI, PMIx, MPICH and Intel MPI each set a variable of their own. To ask MPI itself would
     # start it, which takes time and fails on some machines without a network.
     names = "OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID"
-    return _first_variable(names, default=0)
+    return int([*filter(None, map(os.environ.get, names)), "0"][0])
 
 
 def ranks() -> int:
     """Return the number of MPI ranks as mpirun tells it; 1 where there is none."""
     names = "OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS"
-    return _first_variable(names, default=1)
-
-
-def _first_variable(names: Iterable[str], *, default: int) -> int:
-    """Return the whole number in the first environment variable that is set."""
-    for name in names:
-        if name in os.environ:
-            return int(os.environ[name])
-    return default
+    return int([*filter(None, map(os.environ.get, names)), "1"][0])
 
 
 def as_json(document: Mapping[str, object], *, indent: int | None = None) -> str:

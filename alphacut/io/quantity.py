@@ -307,8 +307,9 @@ def parse_numbers(value: object, si: str) -> tuple[float, ...]:
             raise ValueError(f'"{text}" is no quantity as it stands; {cure}') from None
         raise error from None
     # Only now the decimals are rounded, once each.
-    floats = tuple(float(x) for x in values)
-    if any(x != 0 and not MIN_MAGNITUDE <= abs(x) <= MAX_MAGNITUDE for x in floats):
+    floats = tuple(map(float, values))
+    magnitudes = set(map(abs, floats)) - {0.0}
+    if magnitudes and not MIN_MAGNITUDE <= min(magnitudes) <= max(magnitudes) <= MAX_MAGNITUDE:
         raise ValueError(_out_of_range())
     return floats
 

@@ -148,6 +148,9 @@ class CellProblem:
     def model(self, *, estimate: bool = True, parallel: bool = False) -> AnyModel:
         """Return the model that the sections name: prisms, slices or series, or an own mesh.
 
+        Of "auto" it is the preferred one of those that can solve this kind of particle, which is
+        the analytic series where there is one.
+
         Args:
             estimate: Whether it declares errors, if need be by a reference solution.
             parallel: Whether all MPI ranks work on one cell together.
@@ -155,11 +158,29 @@ class CellProblem:
         Raises:
             RefusedError: The model needs DOLFINx, which is not installed.
         """
+        cell = self.cell
         # DOLFINx takes seconds to import, and is not on every machine: only the models that need it
         # import it, when they are asked for.
         try:
-            if isinstance(self.cell, RoundCell):
-                return self._round_model(self.cell, estimate=estimate, parallel=parallel)
+            if isinstance(cell, RoundCell):
+                fitting = fitting_models(cell.particle_kind, is_isotropic=cell.stiffness is None)
+                name = self.modulus.method
+                if name == "auto":
+                    name = next(iter(fitting))
+                resolution = Resolution(
+                    tolerance=self.modulus.tolerance,
+                    mesh_size=self.mesh.size,
+                    layers=self.mesh.layers,
+                    outline=cell.outline or circle,
+                    lattice=cell.lattice,
+                    # The average along the axes takes C11 + C12 and C33, not C11 − C12.
+                    whole_stiffness=self.average != AXES,
+                    energies=bool(cell.losses),
+                    petsc=self.petsc,
+                    parallel=parallel,
+                    estimate=estimate,
+                )
+                return fitting[name].load().with_resolution(resolution)
             from alphacut.rve.prism.own_mesh import MeshModel
 
             assert self.mesh.file is not None  # the only other kind of cell is one of a mesh file
@@ -169,41 +190,6 @@ class CellProblem:
             value = self.modulus.method
             cure = missing(error)
             raise RefusedError("modulus.method", value, "series", cure) from None
-
-    def _round_model(self, cell: RoundCell, *, estimate: bool, parallel: bool) -> AnyModel:
-        """Return the model of a cell with one particle, at the resolution that the case states.
-
-        Args:
-            cell: Shape of the particle and phases. `modulus.method` must be "auto" or a model that
-                can solve it, which the case has been checked for.
-            estimate: Whether it declares errors.
-            parallel: Whether all MPI ranks work on one cell together.
-
-        Returns:
-            The model of the name `modulus.method`; of "auto" the preferred one of those that can
-            solve this kind of particle, which is the analytic series where there is one.
-
-        Raises:
-            ImportError: The model needs a library that is not installed.
-        """
-        fitting = fitting_models(cell.particle_kind, is_isotropic=cell.stiffness is None)
-        name = self.modulus.method
-        if name == "auto":
-            name = next(iter(fitting))
-        resolution = Resolution(
-            tolerance=self.modulus.tolerance,
-            mesh_size=self.mesh.size,
-            layers=self.mesh.layers,
-            outline=cell.outline or circle,
-            lattice=cell.lattice,
-            # The average along the axes takes C11 + C12 and C33: C11 − C12 need not be solved for.
-            whole_stiffness=self.average != AXES,
-            energies=bool(cell.losses),
-            petsc=self.petsc,
-            parallel=parallel,
-            estimate=estimate,
-        )
-        return fitting[name].load().with_resolution(resolution)
 
     def solve(self, **options: bool) -> HomogenisedStiffness:
         """Return the homogenised stiffness at the nominal values of all parameters.
