@@ -4,6 +4,8 @@ import numpy as np
 import scipy.io
 import scipy.sparse
 
+from tests.alphacut.small import table_of, written
+
 
 def matrices(folder):
     """Masses, a stiffness in two files, and files that are no such matrices."""
@@ -20,8 +22,15 @@ def matrices(folder):
 
 def record(folder, name, samples, step=0.02):
     """A record NAME.csv with samples in m/s²."""
-    rows = "".join(f"{step * k:.2f},{x:.6f}\n" for k, x in enumerate(samples))
+    rows = "".join(f"{step * k:.4f},{x:.6f}\n" for k, x in enumerate(samples))
     (folder / f"{name}.csv").write_text(f"time [s],acceleration [m/s^2]\n{rows}")
+
+
+def sines(folder):
+    """A record of 4 s, and the same 25 times as fast."""
+    time = 0.01 * np.arange(400)
+    for name, step in (("record", 0.01), ("short", 0.0004)):
+        record(folder, name, np.sin(14 * time) + np.sin(9 * time), step)
 
 
 def wind(folder):
@@ -54,3 +63,13 @@ def components(folder):
     record(folder, "slow", rng.normal(size=60), 0.04)
     np.save(folder / "mass.npy", MASS)
     np.save(folder / "stiffness.npy", STIFFNESS)
+
+
+def prepared(folder, name, changes=(), texts=None):
+    """A base case with texts replaced, beside its files."""
+    table = table_of(name)
+    for writer in table.get("files", ()):
+        globals()[writer](folder)
+    for file, text in (texts or {}).items():
+        (folder / file).write_text(text, encoding="utf-8")
+    return written(folder, table["case"], **dict(changes))

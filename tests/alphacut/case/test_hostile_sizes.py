@@ -3,13 +3,11 @@
 import tracemalloc
 
 import numpy as np
-import pytest
 
 from alphacut.commands.motion_text import modes_document, modes_text
 from alphacut.frame import read_spectrum
 from alphacut.frame.structures.linear import NominalModes
 from alphacut.report.page import render_template
-from tests.alphacut.case.test_cut_off import CASE, MASS, STIFFNESS
 from tests.alphacut.small import FRAME, refusals, told_by, written
 from tests.refused import refuses
 
@@ -39,24 +37,6 @@ def test_thousands_of_unknown_keys_are_counted_and_not_listed(tmp_path):
     told = refusals(case)
     assert len(told) == 51
     assert "4950 further problems" in told[-1]
-
-
-@pytest.mark.parametrize("entry", ["1e300", "1e-300", "1e19", "nan", "inf", "true"])
-def test_entries_of_rows_have_the_limits_of_quantities(tmp_path, entry):
-    (tmp_path / "MASS1.mtx").write_text("".join(MASS))
-    (tmp_path / "STIF1.mtx").write_text("".join(STIFFNESS))
-    case = tmp_path / "case.toml"
-    case.write_text(CASE.replace('{ "1.1" = 1.0 }', f'{{ "1.1" = {entry} }}'))
-    (told,) = refusals(case)
-    assert "matrices.outputs.first.row" in told
-
-
-def test_entries_of_matrices_have_the_largest_magnitude_of_quantities(tmp_path):
-    (tmp_path / "MASS1.mtx").write_text("".join(MASS))
-    (tmp_path / "STIF1.mtx").write_text("".join(STIFFNESS).replace("4.0e6", "4.0e26"))
-    (tmp_path / "case.toml").write_text(CASE)
-    (told,) = refusals(tmp_path / "case.toml")
-    assert "with an entry of 4e+26; allowed: entries up to 1e+18" in told
 
 
 def test_a_mode_without_stiffness_within_rounding_has_an_infinite_period():

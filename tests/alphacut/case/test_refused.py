@@ -1,24 +1,30 @@
-"""Mistakes in cases, one file of tables for each base case: each is told in lines with its key."""
+"""Mistakes in cases and what `check` tells of others, one file of tables for each base case."""
 
 import pytest
 
-from tests.alphacut.case import files
-from tests.alphacut.small import TABLES, refusals, table_of, written
-
-MISTAKES = [
-    (path.stem, number)
-    for path in sorted(TABLES.glob("*.toml"))
-    for number in range(len(table_of(path.stem)["refused"]))
-]
+from tests.alphacut.case.files import prepared
+from tests.alphacut.small import TABLES, refusals, table_of, told_by
 
 
-@pytest.mark.parametrize(("name", "number"), MISTAKES)
+def numbered(kind):
+    """Name of the table and number of each entry of a kind."""
+    every = {path.stem: table_of(path.stem).get(kind, ()) for path in sorted(TABLES.glob("*.toml"))}
+    return [(name, number) for name, entries in every.items() for number in range(len(entries))]
+
+
+@pytest.mark.parametrize(("name", "number"), numbered("refused"))
 def test_a_mistake_is_told_with_its_key_and_what_is_allowed(tmp_path, name, number):
-    table = table_of(name)
-    mistake = table["refused"][number]
-    for writer in table.get("files", ()):
-        getattr(files, writer)(tmp_path)
-    lines = refusals(written(tmp_path, table["case"], **dict(mistake["changes"])))
+    mistake = table_of(name)["refused"][number]
+    lines = refusals(prepared(tmp_path, name, mistake["changes"], mistake.get("texts")))
     assert len(lines) == mistake.get("lines", 1), lines
     assert any(all(words in line for words in mistake["words"]) for line in lines), lines
     assert all(len(line) <= 1010 for line in lines)
+
+
+@pytest.mark.parametrize(("name", "number"), numbered("told"))
+def test_what_is_doubtful_is_told_and_nothing_else(tmp_path, name, number):
+    entry = table_of(name)["told"][number]
+    case = prepared(tmp_path, name, entry["changes"], entry.get("texts"))
+    said = " ".join(told_by("check", case).split())
+    assert all(words in said for words in entry.get("words", ())), said
+    assert not any(words in said for words in entry.get("never", ())), said
