@@ -15,6 +15,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar
 
@@ -118,8 +119,6 @@ class Auto(Method):
             follower = ImprovedFollower(0.7 * tolerance, seed=self.seed)
             return _noted(follower.run(flow, progress), f"{follower.name}: not linear")
 
-        # The error of a follower is up to seven times the gain that is worth a graph (measured).
-        follower = ImprovedFollower(0.15 * tolerance, seed=self.seed)
         reasons: list[str] = []
         proved: list[Envelope] = []
         # It is not known beforehand whether the first proof is enough; it usually is.
@@ -136,6 +135,8 @@ class Auto(Method):
             proved.append(found)
             reasons.append(f"{proof.name}: its gap is wider than the tolerance")
 
+        # The error of a follower is up to seven times the gain that is worth a graph (measured).
+        follower = ImprovedFollower(0.15 * tolerance, seed=self.seed)
         # A wide guarantee is better than none, unless a stated tolerance is meant for all nodes.
         best = min(proved, key=lambda found: found.facts["gap_of_peaks"], default=None)
         if best is not None and not self.is_for_all_nodes:
@@ -176,44 +177,52 @@ class Auto(Method):
         found = replace(PeakSearch().run(flow, subprogress(progress, 0.8, 1.0)), outer=outer)
         return _noted(found, f"{PeakSearch.name}; unproved: {reason}")
 
-    def _proofs(self, flow: UnitFlow, reasons: list[str]) -> list[Proof | DualProof]:
-        """Return the proofs to try on a linear structure, in their order; the list may be empty.
+    def _proofs(self, flow: UnitFlow, reasons: list[str]) -> Iterator[Proof | DualProof]:
+        """Yield the proofs to try on a linear structure, in their order.
 
         There are two: branch and bound over the inputs, on the whole box or on sub-boxes, for up to
         six inputs; and the dual bound. The one with less forecast work comes first; branch and
-        bound also if a tolerance is stated for all time nodes.
+        bound also if a tolerance is stated for all time nodes. The work of the dual bound is
+        forecast by a part of the box, which is spared where branch and bound takes less than the
+        least that it may be.
 
         Args:
             flow: The response over the boxes of the inputs.
             reasons: Reasons why a proof is not possible are appended to this list, in place.
         """
+        from alphacut.frame.methods.dual import DualProof
         from alphacut.frame.methods.proof import Proof
 
         # A proof looks at 1000 boxes for each bound on average (tuned: more hardly close gaps).
         proof = Proof(None, self.tolerance, boxes=1000, workers=self.workers)
-        dual = self._dual(flow)
         if len(flow.boxes.names) > MAX_PARAMETERS:
-            return [dual]
-        works: list[float] = []
-        methods: list[Proof | DualProof] = []
-        for method in (proof, dual):
-            try:
-                with refusing():
-                    works.append(method.forecast(exact_flow(flow.flow), flow.boxes))
-                methods.append(method)
-            except UnprovedError as error:
-                reasons.append(f"{method.name}: {error}")
-        # If only one proof is possible, there is no choice.
-        if len(methods) < 2:
-            return methods
+            yield self._dual(flow)
+            return
+        exact = exact_flow(flow.flow)
+        method: Proof | DualProof = proof
+        # Branch and bound closes the gap at all nodes alike, the dual bound only at peaks.
+        is_first = self.is_for_all_nodes
+        try:
+            with refusing():
+                work = proof.forecast(exact, flow.boxes)
+                is_first = is_first or work <= DualProof.slabs * DualProof.steps
+                if not is_first:
+                    method = self._dual(flow)
+                    is_first = work <= method.forecast(exact, flow.boxes)
+        except UnprovedError as error:
+            # If only one proof is possible, there is no choice.
+            reasons.append(f"{method.name}: {error}")
+            yield self._dual(flow) if method is proof else proof
+            return
         undivided = replace(proof, parts=1)
-        # Branch and bound closes the gap at all nodes alike, the dual bound only at peaks. Branch
-        # and bound on sub-boxes comes last, because each one costs as much as the whole box.
-        if self.is_for_all_nodes or works[0] <= works[1]:
-            if self.dual_first:
-                return [dual, undivided, proof]
-            return [undivided, dual, proof]
-        return [dual, undivided]
+        if is_first and not self.dual_first:
+            yield undivided
+        yield self._dual(flow)
+        if not is_first or self.dual_first:
+            yield undivided
+        # Branch and bound on sub-boxes comes last, because each one costs as much as the whole box.
+        if is_first:
+            yield proof
 
     def _dual(self, flow: UnitFlow) -> DualProof:
         """Return the dual bound with gaps that fit the tolerance.
