@@ -195,7 +195,7 @@ def matrix_of_entries(
     n_off_diagonal = len(values) - int(counts.diagonal().sum())
     if not is_mirrored or n_single == 0:
         return array
-    value = f"with both triangles at {(n_off_diagonal - n_single) // 2} places, one at {n_single}"
+    value = f"with one triangle at {n_single} places, both at others"
     cure = "write a symmetric matrix, by one triangle or both"
     require(n_single == n_off_diagonal, name, value, "one triangle, or two alike", cure)
     return np.where(counts == 1, array, array.T)

@@ -134,7 +134,7 @@ def _texts_in(path: Path, member: str) -> Iterator[tuple[str, str]]:
                 yield name.replace("_", " "), "in the name of its array"
             if "unit" in name.lower():
                 yield f"unit {read_npz(path, name, kinds='SU')}", f"array {name}"
-    if suffix not in (".mtx", ".csv", ".pch", ".bdf", ".nas", ".sti", ".mas"):
+    if suffix in (".npz", ".npy", ".op4", ".full"):
         return
     content = path.read_bytes()
     for comment in re.finditer(rb"(?m)(?:^[ \t]*(?:%(?!%MatrixM)|\$|\*\*|//)|#).*$", content):
@@ -194,8 +194,9 @@ def _stated_factor(path: Path, member: str, quantity: str) -> float:
                 where.append(Stated(factor, one.shown, where_it_stands))
                 kinds |= {_QUANTITIES.get(one.dimension, "")} if where is stated else set()
     found = settled(path.name, "unit", stated)
-    # A unit of forces is one of a system of units.
-    is_asked = not quantity or not kinds or bool(kinds & {"", quantity})
+    # A unit of forces alone, or beside one of masses, is one of a system of units.
+    is_system = kinds <= {"", "mass"} and kinds != {"mass"}
+    is_asked = not quantity or quantity in kinds or is_system
     what = f"of {' and '.join(sorted(kinds))}, by {found or 'its ending'}"
     require(is_asked, path.name, what, f"of {quantity}", "name the file of that quantity")
     taken = found or Stated(1.0, "of SI")

@@ -108,7 +108,7 @@ def _read_volume(path: Path, sides: Sequence[float], override: Collection[str]) 
         Exception: What readers raise of damaged files, of many kinds.
     """
     if path.is_dir():
-        return _read_slices(path, sides[-2:], override)
+        return _read_slices(path, sides, override)
     ending = path.suffix.lower()
     if ending in (".tif", ".tiff"):
         return read_stack(path, sides, override)
@@ -127,8 +127,8 @@ def _read_slices(folder: Path, sides: Sequence[float], override: Collection[str]
     Args:
         folder: Folder whose .tif, .tiff, .png and .bmp files are the slices along z; others in it
             are ignored.
-        sides: Sides of a pixel along (y, x), in m.
-        override: "voxel", where pictures state wrong ones.
+        sides: Sides of a voxel along (z, y, x), in m.
+        override: "voxel", where pictures, or a log beside them, state wrong ones.
 
     Returns:
         Numbers in the type of the pictures, shape (slices, rows, columns), the top row first.
@@ -151,15 +151,17 @@ def _read_slices(folder: Path, sides: Sequence[float], override: Collection[str]
     what = f"{count} pictures, none with number {min(missing, default=lowest)}"
     require(not missing, folder.name, what, "slices with numbers that follow one another")
     # Bruker's scanners write a list of settings beside the slices.
-    logs = [x.read_text("utf-8", "replace") for x in sorted(folder.glob("*.log")) if x.is_file()]
+    logs = [x.read_text("utf-8", "replace") for x in folder.glob("*.log") if x.is_file()]
     lines = "\n".join(logs).splitlines()
-    further = [line for line in lines if re.search("(?i)pixel.*size", line)]
-    first = _read_picture(by_number[lowest], sides, override, further)
+    # Their pixels are sides of cubes.
+    texts = [line.lower().replace("pixel", "voxel") for line in lines if "ixel" in line]
+    require_spacing(folder.name, StatedSpacing([], [], texts), sides, override=override)
+    first = _read_picture(by_number[lowest], sides[-2:], override)
     shape = (count, *first.shape)
     require_memory(shape)
     values = np.empty(shape, first.dtype)
     for number, file in by_number.items():
-        page = _read_picture(file, sides, override)
+        page = _read_picture(file, sides[-2:], override)
         is_alike = page.shape == first.shape and page.dtype == first.dtype
         what = f"{page.dtype} of shape {page.shape}"
         require(is_alike, file.name, what, f"{first.dtype} of shape {first.shape} as the others")
@@ -192,9 +194,7 @@ def _numbers_in_names(files: Sequence[Path]) -> list[int]:
     return [int(found[place]) for found in numbers]
 
 
-def _read_picture(
-    path: Path, sides: Sequence[float], override: Collection[str], further: Sequence[str] = ()
-) -> Array:
+def _read_picture(path: Path, sides: Sequence[float], override: Collection[str]) -> Array:
     """Return the grey values of an image file, bright large, shape (rows, columns), top row first.
 
     Args:
@@ -202,7 +202,6 @@ def _read_picture(
         sides: Sides of a pixel along (y, x), in m. If they are equal, the picture may not state
             unequal ones.
         override: "voxel", where the picture states wrong ones.
-        further: Lines beside the picture that may state the sides of its pixels.
 
     Raises:
         RefusedError: The file has several pages, or colours that are not grey, or states other
@@ -220,7 +219,7 @@ def _read_picture(
         require(is_read, path.name, what, "one page of grey values", cure)
         found = _spacing_of(path, picture)
         texts = [text for text in picture.info.values() if isinstance(text, str)]
-        found = found._replace(texts=[*texts, *found.texts, *further])
+        found = found._replace(texts=[*texts, *found.texts])
         require_spacing(path.name, found, sides, override=override)
         require_memory((picture.height, picture.width))
         if is_colour:

@@ -295,12 +295,12 @@ def test_units_tell_the_quantity_and_names_of_files_state_none(tmp_path):
     matrix = np.array([[2.0, -1.0], [-1.0, 2.0]])
     np.save(tmp_path / "K_kN_per_m.npy", matrix)
     (tmp_path / "frame MN.csv").write_text(
-        "# translations in kN/m, rotations in kN m\n2,-1\n-1,2\n"
+        "# springs kN/m; rotations kN m/rad; shear kN\n2,-1\n-1,2\n"
     )
     np.savez(tmp_path / "m.npz", M_tonne=matrix)
     np.savez(tmp_path / "n.npz", k=matrix, unit="MN/m")
     (tmp_path / "k.csv").write_text("# damping, kN s/m\n2,-1\n-1,2\n")
-    (tmp_path / "s.csv").write_text("# units: kN, m\n2,-1\n-1,2\n")
+    (tmp_path / "s.csv").write_text("# units: kN, m, t\n2,-1\n-1,2\n")
     cases = {
         "K_kN_per_m.npy": (1, {"mass", "stiffness", "damping"}),
         "frame MN.csv": (1e3, {"stiffness"}),

@@ -639,5 +639,6 @@ def test_resolutions_of_printers_state_nothing_and_logs_beside_slices_do(tmp_pat
     log = "[Acquisition]\nCamera Pixel Size (um)= 9.00\nImage Pixel Size (um)= 3.25\n"
     (tmp_path / "b" / "rec.log").write_text(log)
     read_image(tmp_path / "b", spacing=3.25e-6)
-    with pytest.raises(RefusedError, match=r"3\.25 um"):
-        read_image(tmp_path / "b", spacing=9e-6)
+    for wrong in (9e-6, (3.25e-6, 3.25e-6, 6.5e-6)):
+        with pytest.raises(RefusedError, match=r"3\.25 um"):
+            read_image(tmp_path / "b", spacing=wrong)
