@@ -97,17 +97,3 @@ def test_the_third_component_is_the_vertical_one(tmp_path):
     (record,) = records_of(path)
     assert len(record.components) == 3
     assert not [text for text in record.warnings if "vertical" in text]
-
-
-@pytest.mark.parametrize(
-    ("directions", "words"),
-    [
-        ('["x", "y"]', ""),
-        ('["x", { "1.x" = 0.6, "1.y" = 0.8 }]', "the first two are not at right angles"),
-        ('["x", { "1.y" = 0.5 }]', "the first two move 20,000 kg and 5,000 kg"),
-    ],
-)
-def test_check_warns_of_directions_that_are_no_motions_of_one_ground(tmp_path, directions, words):
-    said = " ".join(told_by("check", written(tmp_path, '["x", "y"]', directions)).split())
-    assert words in said
-    assert ("warning: matrices.directions" in said) == bool(words)

@@ -8,7 +8,7 @@ from alphacut.rve.cell.lattice import HEXAGONAL, SQUARE
 from alphacut.stages.cell import CellProblem
 from alphacut.stages.modulus import identity, solved
 from tests.alphacut.case.test_load import fraction_case, problems, read
-from tests.alphacut.small import CELL, refusals, told_by, written
+from tests.alphacut.small import CELL, written
 
 
 def problem(folder, *changes):
@@ -55,17 +55,3 @@ def test_samples_of_one_lattice_are_none_of_another(tmp_path):
     assert identity(square) != identity(hexagonal)
     cuts = [solved(one, progress=False, alpha=[0.0, 1.0]).bounds for one in (square, hexagonal)]
     assert (cuts[0].bounds("E")[0] != cuts[1].bounds("E")[0]).all()
-
-
-@pytest.mark.parametrize("lattice", ["cubic", "[1]", "[1, 2, 3]", "[1, 0]", "3", "[1, 11]"])
-def test_other_lattices_are_refused_in_one_line(tmp_path, lattice):
-    [line] = refusals(written(tmp_path, CELL), f"cell.lattice={lattice}")
-    assert f'cell.lattice is {lattice}; allowed: "square", "hexagonal"' in line
-
-
-def test_spheres_and_fitted_radii_have_the_square_alone(tmp_path):
-    changes = "cell.particles=spheres", "cell.lattice=hexagonal"
-    [line] = refusals(written(tmp_path, CELL), *changes)
-    assert 'cell.lattice is hexagonal; allowed: "square", the cubic array of spheres' in line
-    error = told_by("check", "cases/concrete.toml", "--set=cell.lattice=hexagonal", status=2)
-    assert "allowed: square beside stage microstructure; give [radius] or cell.fraction" in error

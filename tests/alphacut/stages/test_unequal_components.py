@@ -6,7 +6,6 @@ import pytest
 from alphacut import main
 from alphacut.case.content import load
 from alphacut.stages.suite import suite_records
-from tests.alphacut.small import refusals
 
 CASE = """title = "An eccentric floor"
 stages = ["envelope"]
@@ -58,11 +57,3 @@ def test_the_shorter_component_ends_in_zeros_and_it_is_said(tmp_path, capsys, rn
     assert short[:40] == pytest.approx(samples["short"] - offset, abs=1e-6)
     assert np.all(short[40:] == 0)
     assert len(short) == len(long) == 60
-
-
-def test_components_of_two_steps_are_refused(tmp_path, rng):
-    case, _ = written(tmp_path, rng, (40, 40))
-    text = (tmp_path / "long.AT2").read_text()
-    (tmp_path / "long.AT2").write_text(text.replace("DT= 0.02", "DT= 0.01"))
-    (told,) = refusals(case)
-    assert "components of one step; bring both to one step" in told
