@@ -76,7 +76,7 @@ def classical_modes(
     for of_block in participations:
         of_modes = oscillators(structure, of_block, found)
         if len(of_modes) > 1:
-            bounds = coupling_bounds(structure, of_block, excitation)
+            bounds = coupling_bounds(structure, of_block, found, excitation)
             sums = modal_sums_of_block(of_block)
             by_sums = response_of_truncated_modes(sums, bounds.ranges, structure, found, excitation)
             # The narrower of both is taken, in comparison with what is allowed. One oscillator

@@ -387,6 +387,7 @@ class CouplingBounds(NamedTuple):
 def coupling_bounds(
     structure: ClassicalStructure,
     participation: BlockParticipation,
+    found: Subspaces,
     excitation: Excitation,
 ) -> CouplingBounds:
     """Bound what couples the oscillators of a block of several modes.
@@ -398,6 +399,7 @@ def coupling_bounds(
     Args:
         structure: The structure over the box, with m outputs.
         participation: The block and how it takes part in the response.
+        found: All enclosed modes, with ranges of their eigenvalues.
         excitation: T time nodes and sources.
 
     Returns:
@@ -410,9 +412,14 @@ def coupling_bounds(
     """
     time, sources = excitation
     factors = _coupling_factors(structure, participation)
-    low, high = eigenvalue_discs(participation.block.eigenvalue_block)
-    modes = participation.block.modes
-    ranges = damped_ranges(structure, float(low.min()), float(high.max()), modes)
+    block = participation.block
+    modes = block.modes
+    discs = eigenvalue_discs(block.eigenvalue_block)
+    # Of the eigenvalues, within discs and bounds by Rayleigh quotients, and of the diagonal of L.
+    low, high = block.eigenvalue_block[np.diag_indices(len(modes))].bounds()
+    lowest = min(low.min(), max(discs[0].min(), found.eigenvalue_low[modes[0]]))
+    highest = max(high.max(), min(discs[1].max(), found.eigenvalue_high[modes[-1]]))
+    ranges = damped_ranges(structure, float(lowest), float(highest), modes)
     low_omega, high_omega = ranges.omega
     _, max_quotient = ranges.quotient
 

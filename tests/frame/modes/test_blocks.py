@@ -465,8 +465,11 @@ def test_coupling_within_a_block_attains_its_bounds_at_nodes_and_between(rng):
         rayleigh=zero.like(np.zeros(2)),
         damping_ratios=zero.like(np.zeros(2)),
     )
+    found = SimpleNamespace(
+        eigenvalue_low=np.full(2, squared - off), eigenvalue_high=np.full(2, squared + off)
+    )
     excitation = Excitation(time, [Source.named("start")])
-    added, deviation, _ = coupling_bounds(structure, of_block, excitation)
+    added, deviation, _ = coupling_bounds(structure, of_block, found, excitation)
     largest_read = 1 + variation / 2
 
     def coupled(t):
