@@ -30,6 +30,7 @@ from alphacut.frame.bounds.node_bounds import Cells, Effort, bound_nodes, halve_
 from alphacut.frame.calculus.polynomials import monomials
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.modes.modes import Modes, Oscillator
+from alphacut.frame.numbers import LEAST_PEAK_NODES, LEAST_PEAK_PATIENCE, LEAST_PEAK_STEPS
 from alphacut.frame.response.chord_deviation import Grid
 from alphacut.frame.response.oscillators import (
     Oscillators,
@@ -556,7 +557,7 @@ def _bound_cell(
     largest = -np.inf
     u = np.zeros(len(at))
     of_node = np.empty(len(disagreement))
-    for _ in range(numbers.LEAST_PEAK_NODES):
+    for _ in range(LEAST_PEAK_NODES):
         node = int(untried.argmax())
         if untried[node] <= max(largest, -1.0):
             break
@@ -569,8 +570,8 @@ def _bound_cell(
             node,
             2.0 * s - 1.0,
             sides[s],
-            numbers.LEAST_PEAK_STEPS,
-            numbers.LEAST_PEAK_PATIENCE,
+            LEAST_PEAK_STEPS,
+            LEAST_PEAK_PATIENCE,
             -1e300,  # no target
             (2.0 * s - 1.0) * response[node],
             of_node,

@@ -13,7 +13,6 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.kernels import compiled
-from alphacut.frame import numbers
 from alphacut.frame.bounds.dual_function import (
     DualFunctionData,
     add,
@@ -22,6 +21,7 @@ from alphacut.frame.bounds.dual_function import (
     minimise,
     products,
 )
+from alphacut.frame.numbers import CELL_GRACE, MIN_CELL_PROGRESS, PATIENCE
 
 
 class Effort(NamedTuple):
@@ -105,9 +105,9 @@ def bound_nodes(
         while count < max_cells:
             worst = int(np.argmax(cells.value[:count]))
             target = target_value(model_value, min_gap, effort, constant)
-            even_fall = (first_bound - target) * numbers.MIN_CELL_PROGRESS * count / max_cells
+            even_fall = (first_bound - target) * MIN_CELL_PROGRESS * count / max_cells
             falls_slowly = cells.value[worst] > first_bound - even_fall
-            if cells.value[worst] <= target or (count >= numbers.CELL_GRACE and falls_slowly):
+            if cells.value[worst] <= target or (count >= CELL_GRACE and falls_slowly):
                 break
             if not halve_cell(cells, worst, count):
                 break
@@ -180,7 +180,7 @@ def bound_cell(
         side,
         data,
         effort.steps,
-        numbers.PATIENCE,
+        PATIENCE,
         target,
         model_value,
         cells.disagreement[cell],

@@ -75,6 +75,8 @@ class RawHead:
                 continue
             # A skip of −1 means that the numbers are the last bytes, whatever stands before them.
             offset = self.offset if self.offset >= 0 else found - expected
+            if offset > 0:
+                allowed = f"{offset} + {allowed}"
             is_whole = offset >= 0 and found == offset + expected
             require(is_whole, file.name, f"{found} bytes", allowed, cure)
             parts.append(np.fromfile(file, self.dtype, offset=offset))

@@ -69,7 +69,7 @@ def test_circles_from_a_file(tmp_path, text):
         (GOOD + "35,85,1\n", "row 5", "section of 40 × 40 mm; mend the row, or the size"),
         (GOOD.replace("y [mm]", "y"), "header", "'y [mm]'"),
         (GOOD.replace("r [mm]", "r [kg]"), "header", "'d [mm]'"),
-        (GOOD.replace(",", ";").replace("12", "1,2"), "row 3, column 2", "numbers"),
+        (GOOD.replace(",", ";").replace("12", "1,2,3"), "row 3, column 2", "numbers"),
         (GOOD + "12,5,15,0,4,0\n", "row 5", "as many fields as the header"),
         ("", "circles.csv", "rows of numbers"),
         ("\udcff", "circles.csv", "text files in UTF-8"),
