@@ -120,10 +120,11 @@ def dense_of_entries(
     places = np.stack([rows, columns])
     is_whole = (places >= 0) & (places == np.floor(places))
     is_inside = (is_whole & (places < np.reshape(shape, (2, 1)))).all(axis=0)
-    row, column = places[:, int(is_inside.argmin())] + 1
-    cure = f"the file states {shape[0]} × {shape[1]}: mend the line of sizes, or the entry"
-    allowed = "rows and columns inside, counted from 1"
-    require(bool(is_inside.all()), name, f"with an entry at [{row:g}, {column:g}]", allowed, cure)
+    if not is_inside.all():
+        row, column = places[:, int(is_inside.argmin())] + 1
+        cure = f"the file states {shape[0]} × {shape[1]}: mend the line of sizes, or the entry"
+        allowed = "rows and columns inside, counted from 1"
+        raise RefusedError(name, f"with an entry at [{row:g}, {column:g}]", allowed, cure)
     # An assignment by indices would keep the last of several entries of one place; finite-element
     # programs write one entry for each element there.
     matrix = np.zeros(shape)
