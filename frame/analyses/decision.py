@@ -100,9 +100,11 @@ class LimitDecision(LimitResult):
         of the box open, an undecided one says which. A lowest computed level other than 0 is
         then added: "not exceeded from α = 0.5 up".
         """
-        is_open = self.peak is not None and self.peak.is_to_limits and self.peak.cause
-        if self.verdict == "undecided" and is_open:
-            return f"{self.verdict}: {is_open}"
+        open_part = ""
+        if self.peak is not None and self.peak.is_to_limits:
+            open_part = self.peak.cause
+        if self.verdict == "undecided" and open_part:
+            return f"{self.verdict}: {open_part}"
         # If all responses exceed the limit, a single one is no news.
         is_by_some = self.verdict == "can be exceeded"
         if not is_by_some or self.peak is None or not self.peak.reached_at:

@@ -519,7 +519,7 @@ def with_combined(
 
 
 def widest_cause(peaks: Iterable[Peak]) -> str:
-    """Return why the bound is wide of those of several peaks, not mirrored, that is the largest."""
+    """Return the cause of the gap of the peak with the largest bound, of some not mirrored."""
     return max(peaks, key=lambda peak: float(peak.upper[0])).cause
 
 

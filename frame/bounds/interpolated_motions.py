@@ -77,9 +77,9 @@ class LoadIntegrals(NamedTuple):
 
 
 class Search(NamedTuple):
-    """How far J motions have been searched for events, and how they move over a quiet interval.
+    """How far J motions have been searched for events, and how they move over a quiet step.
 
-    Over an interval of the length `step` without an event the state at its end, and before it the
+    Over a step of the length `step` without an event the state at its end, and before it the
     slider's elastic force, or the rate of the drift of a yielding storey, at its quarters, are
     linear in the state at its beginning, the powers of the loads, and a constant: c of an elastic
     storey, the direction of yielding else.
@@ -87,7 +87,7 @@ class Search(NamedTuple):
 
     time: Array  # up to which there is no event that is not left out, (J,), in s
     state: Array  # X and P there, (J, 2N)
-    step: float  # in s
+    step: float  # part of an interval of the loads, in s
     rows: Array  # of an elastic and of a yielding storey, (J, 2, 4 + 2N, 2N + 4 L + 1)
 
 
@@ -227,7 +227,7 @@ def _excess(powers: Array, tau: float, side: int, limit: float) -> float:
 
 @compiled
 def _fill_rows(frames: Frames, step: float, rows: Array) -> None:
-    """Write how motions move over a quiet interval to `rows`; see `Search`."""
+    """Write how motions move over a quiet step to `rows`; see `Search`."""
     n, n_sets = frames.inverse_mass.shape
     series = np.empty((MAX_TERMS, 2 * n))
     unit = np.zeros(rows.shape[-1])
@@ -341,8 +341,9 @@ def _next_event(
     while search.time[j] < until:
         t = search.time[j]
         i = _interval(loads, t)
-        left = loads.edges[i + 1] - t
-        h = left / max(math.ceil(left / longest - 1e-9), 1)
+        # Equal steps to the end of the interval, most of which have the length of a quiet one.
+        rest = loads.edges[i + 1] - t
+        h = rest / max(math.ceil(rest / longest - 1e-9), 1)
         is_whole = t > after and abs(h - search.step) < 1e-9 * h
         if is_whole and not passes and _passes_quietly(
             loads, search, j, phase, constant, i, limit + tolerance
