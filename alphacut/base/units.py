@@ -248,8 +248,8 @@ def word_of(name: str) -> Word | None:
 
 
 @lru_cache(maxsize=1)
-def _patterns() -> tuple[re.Pattern[str], re.Pattern[str]]:
-    """Return the patterns of a unit, and of one of its atoms behind the mark that joins it."""
+def _joined_atom() -> re.Pattern[str]:
+    """Return the pattern of an atom of a unit, behind the mark that joins it to the atom before it."""
     spaced = {name.lower() for name in _words() if "~" in name}
     plain = {name.lower() for name in _words()} - {name.replace("~", "") for name in spaced}
     names = (re.escape(x).replace("\\~", "~").replace("~", r"[-\s_]*") for x in plain)
@@ -266,9 +266,7 @@ def _patterns() -> tuple[re.Pattern[str], re.Pattern[str]]:
         r"(\s*/\s*\(?|[\s_]*(?<![a-z])(?:per|pro|par|por)[\s_]+|_p?(?=s\^?2)|\s*[*·×]\s*|[-.](?=[a-z])"
         r"|\s+(?=[^\W\d_]+\s*(?:\^|\*\*)?\s*[({]?-\d)|(?-i:(?<=[Nf])\s+(?=[cm]?m\b|s\b)))"
     )
-    whole = re.sub(r"\((?=[^?])", "(?:", f"{atom}(?:{mark}{atom})*")
-    flags = re.IGNORECASE
-    return re.compile(whole, flags), re.compile(f"{mark}?{atom}", flags)
+    return re.compile(f"{mark}?{atom}", re.IGNORECASE)
 
 
 class _Parsed(NamedTuple):
@@ -280,17 +278,14 @@ class _Parsed(NamedTuple):
 
 def _parsed(text: str, start: int) -> _Parsed | None:
     """Return the unit that begins at an index of a text; None where none does."""
-    whole, part = _patterns()
-    match = whole.match(text, start)
-    if match is None:
-        return None
-    atoms = []
+    atoms: list[tuple[str, int]] = []
     end = start
     outer = 1  # −1 within a bracket behind "/"
-    while end < match.end() and (one := part.match(text, end)):
+    while one := _joined_atom().match(text, end):
         mark, shape, name, bracketed, power, glued, spelled = one.groups()
         name = re.sub(r"[-\s_]", "", name)
-        if word_of(name) is None:
+        # Each atom but the first has a mark before it.
+        if (mark is None) != (not atoms) or word_of(name) is None:
             break
         is_quotient = re.search("(?i)/|p[aeor]+|_", mark or "") is not None
         if "(" in (mark or ""):
