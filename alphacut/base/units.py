@@ -249,7 +249,7 @@ def word_of(name: str) -> Word | None:
 
 @lru_cache(maxsize=1)
 def _joined_atom() -> re.Pattern[str]:
-    """Return the pattern of an atom of a unit, behind the mark that joins it to the atom before it."""
+    """Return the pattern of an atom of a unit, behind what joins it to the atom before it."""
     spaced = {name.lower() for name in _words() if "~" in name}
     plain = {name.lower() for name in _words()} - {name.replace("~", "") for name in spaced}
     names = (re.escape(x).replace("\\~", "~").replace("~", r"[-\s_]*") for x in plain)
