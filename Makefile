@@ -91,7 +91,7 @@ test-wheels:
 	$(IN) $(WHEELS)/pip install --quiet --requirement build/wheels/requirements.txt pyvista
 	$(IN) $(WHEELS)/pip install --quiet --no-deps $(COMPARED)
 	$(IN) $(WHEELS)/pip list
-	$(IN) env PATH=$(CURDIR)/$(WHEELS):/usr/bin:/bin python -m pytest -m "not slow" --timeout 400 $(PYTEST) \
+	$(IN) env PATH=$(CURDIR)/$(WHEELS):/usr/bin:/bin python -m pytest -m "not slow" -n $(WORKERS) --dist worksteal --timeout 400 $(PYTEST) \
 		tests/rve tests/alphacut/report tests/scenes tests/environment/test_versions.py \
 		tests/frame/structures/test_program_files.py tests/frame/spectra
 

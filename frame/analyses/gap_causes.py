@@ -136,7 +136,8 @@ def wide_gap(
         modes = "its modes"
         if isinstance(model, LinearSystem) and not yields(model):
             modes = main_modes(model, output)
-        causes.append(f"over the ranges of the inputs it is open how {modes} add up")
+        add = "adds" if modes.startswith("mode ") else "add"
+        causes.append(f"over the ranges of the inputs it is open how much {modes} {add}")
         cures.append(f"narrow {_most_important(model, band, output)} first, which moves it most")
     return f"{', and '.join(causes)}; {', or '.join(cures)}"
 
