@@ -34,7 +34,7 @@ from alphacut.frame.modes.structure import (
     classical_structure,
     parameter_models,
 )
-from alphacut.frame.response.oscillators import Source
+from alphacut.frame.response.tables import Source
 from alphacut.frame.result import within_steps
 from alphacut.frame.structures.linear import LinearSystem, histories
 

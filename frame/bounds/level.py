@@ -32,7 +32,7 @@ from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.modes.modes import Modes, Oscillator
 from alphacut.frame.numbers import LEAST_PEAK_NODES, LEAST_PEAK_PATIENCE, LEAST_PEAK_STEPS
 from alphacut.frame.response.chord_deviation import Grid
-from alphacut.frame.response.oscillators import (
+from alphacut.frame.response.tables import (
     Oscillators,
     grid_over,
     intervals,

@@ -26,7 +26,7 @@ from alphacut.frame.modes.truncated_modes import (
     truncated_modes,
 )
 from alphacut.frame.response.duhamel import responses_at_nodes
-from alphacut.frame.response.oscillators import POWERS
+from alphacut.frame.response.tables import POWERS
 
 
 def classical_modes(

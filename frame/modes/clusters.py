@@ -34,7 +34,7 @@ from alphacut.frame.modes.blocks import (
 from alphacut.frame.modes.model_fields import with_models
 from alphacut.frame.modes.modes import Ends, Oscillator, overlap, range_of
 from alphacut.frame.modes.structure import ClassicalStructure
-from alphacut.frame.response.oscillators import Source
+from alphacut.frame.response.tables import Source
 from alphacut.frame.structures.linear import undamped_modes
 
 

@@ -39,7 +39,7 @@ from alphacut.frame.modes.damped import (
     require_dissipation,
 )
 from alphacut.frame.response.duhamel import absolute_moments
-from alphacut.frame.response.load_tables import Direct, LoadTables
+from alphacut.frame.response.tables import Direct, LoadTables
 from alphacut.frame.structures.linear import histories
 from alphacut.frame.structures.loads import distinct_histories
 

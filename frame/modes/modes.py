@@ -41,8 +41,7 @@ from alphacut.frame.modes.modal_model import (
 from alphacut.frame.modes.model_fields import on_subbox
 from alphacut.frame.records.history import History
 from alphacut.frame.response.chord_deviation import Grid, load_deviation
-from alphacut.frame.response.load_tables import Direct
-from alphacut.frame.response.oscillators import Oscillators, Source, grid_over
+from alphacut.frame.response.tables import Direct, Oscillators, Source, grid_over
 from alphacut.frame.structures.loads import distinct_histories
 
 

@@ -42,7 +42,7 @@ from alphacut.frame.modes.clusters import (
 from alphacut.frame.modes.model_fields import with_models
 from alphacut.frame.modes.modes import Excitation, TruncatedModes
 from alphacut.frame.modes.structure import ClassicalStructure
-from alphacut.frame.response.oscillators import (
+from alphacut.frame.response.tables import (
     Oscillators,
     Ranges,
     Source,

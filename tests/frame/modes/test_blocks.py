@@ -37,7 +37,7 @@ from alphacut.frame.modes.truncated_modes import (
     inverse_form,
     response_slopes,
 )
-from alphacut.frame.response.oscillators import (
+from alphacut.frame.response.tables import (
     Oscillators,
     Source,
     grid_over,

@@ -18,8 +18,7 @@ from alphacut.frame.response.duhamel import (
     responses_at_nodes,
     step_integrals,
 )
-from alphacut.frame.response.load_tables import LoadTable
-from alphacut.frame.response.oscillators import Oscillators, Source, grid_over
+from alphacut.frame.response.tables import LoadTable, Oscillators, Source, grid_over
 from tests.frame import test_forces
 
 UNIT = 2.0**-53

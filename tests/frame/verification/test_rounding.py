@@ -12,7 +12,7 @@ from alphacut.frame.boxes import boxes
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.modes.modal_model import ModalModel
-from alphacut.frame.response.oscillators import Oscillators, Source, grid_over
+from alphacut.frame.response.tables import Oscillators, Source, grid_over
 from alphacut.frame.verification.self_test import structures_at
 from alphacut.fuzzy import Crisp, Interval
 
