@@ -3,6 +3,7 @@
 import numpy as np
 
 from alphacut.frame import Exact, LinearFlow
+from alphacut.frame.verification.self_test import structures_at
 
 
 def random_points(inputs, count, rng, alpha=0.0):
@@ -16,6 +17,19 @@ def random_points(inputs, count, rng, alpha=0.0):
 def exact_motions(model, points, inputs, duration, step):
     """Exact motions at points (S, d) of a linear model's inputs, shape (S, T, m)."""
     return LinearFlow(model, tuple(inputs), duration, step, Exact()).values(points)
+
+
+def judged_motions(model, points, inputs, times):
+    """Motions at points (S, d) by the judge of proofs, shape (S, T, m)."""
+    motions = structures_at(model, tuple(inputs), points)
+    return np.stack([motion.outputs(times).values for motion in motions])
+
+
+def off_chords(values, parts):
+    """How far values at `parts` equal parts of each step lie off its chord, (steps, ...)."""
+    nodes, x = values[::parts, None], np.arange(parts) / parts
+    chord = nodes[:-1] + x.reshape(-1, *[1] * (values.ndim - 1)) * np.diff(nodes, axis=0)
+    return np.abs(values[:-1].reshape(chord.shape) - chord).max(1)
 
 
 def require_inside(values, found, level=0, slack=0.0):

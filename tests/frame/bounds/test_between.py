@@ -5,7 +5,7 @@ import pytest
 
 from alphacut.frame import Accelerogram, DualProof, Force, History, Proof, StoreyFrame, envelope
 from alphacut.fuzzy import Triangular
-from tests.frame.motions import exact_motions, random_points
+from tests.frame.motions import exact_motions, off_chords, random_points
 
 FLOORS, PARTS = 3, 20
 NOISE = np.random.default_rng(800900).normal(size=300)
@@ -40,9 +40,7 @@ def test_between_is_at_most_a_few_times_the_true_deviation(proof, load, periods)
     inputs = {name: Triangular(0.97 * value, value, 1.03 * value) for name, value in CENTRE.items()}
     points = random_points(inputs, 16, np.random.default_rng(1))
     values = exact_motions(frame, points, inputs, steps * step, step / PARTS)
-    nodes, x = values[:, ::PARTS, None], np.arange(PARTS)[:, None] / PARTS
-    chord = (1 - x) * nodes[:, :-1] + x * nodes[:, 1:]
-    off = np.abs(values[:, :-1].reshape(chord.shape) - chord).max((0, 2))
+    off = off_chords(values.swapaxes(0, 1), PARTS).max(1)
     given = {"duration": steps * step, "step": step, "alpha": (0,), "progress": False}
     between = envelope(frame, inputs, proof, **given).between
     assert (off <= between[1:] * (1 + 1e-9)).all()

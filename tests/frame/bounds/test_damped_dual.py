@@ -20,9 +20,9 @@ from alphacut.frame.boxes import Boxes, UnitFlow, boxes
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.modes.modes import damped_modes
-from alphacut.frame.verification.self_test import structures_at
+from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.fuzzy import Interval
-from tests.frame.motions import random_points, require_inside
+from tests.frame.motions import judged_motions, random_points, require_inside
 
 TIME = {"duration": 2.0, "step": 0.02}
 NOISE = np.random.default_rng(4).normal(size=60)
@@ -69,9 +69,8 @@ def test_no_motion_leaves_the_bounds_at_nodes_or_between(moved, rng):
     points = random_points(inputs, 40, rng)
     times = np.sort(np.append(found.time, rng.uniform(0, 2.0, (parts - 1) * 100)))
     step = np.searchsorted(found.time, times, side="left")
-    for motion in structures_at(system, tuple(inputs), points):
-        require_inside(motion.outputs(found.time).values[None], found, slack=1e-12)
-        values = motion.outputs(times).values
+    require_inside(judged_motions(system, points, inputs, found.time), found, slack=1e-12)
+    for values in judged_motions(system, points, inputs, times):
         for sign, at_nodes in ((1.0, found.upper[0]), (-1.0, -found.lower[0])):
             bound = np.maximum(at_nodes[step], at_nodes[np.maximum(step - 1, 0)])
             assert (sign * values <= bound + found.between[step] + 1e-12).all()
@@ -103,7 +102,7 @@ def test_oscillators_and_feedthrough_add_up_to_the_response(moved, rng):
     size = np.abs(flow.values(centre[None])[0]).max(0)
     found = damped_modes(flow, cuts, {}, 1e-3 * size)
     for u in rng.uniform(-1, 1, (3, 3)):
-        (motion,) = structures_at(system, names, centre * (1 + 0.01 * u)[None])
+        (exact,) = judged_motions(system, centre * (1 + 0.01 * u)[None], names, flow.time)
         total = np.zeros((len(flow.time), 4))
         for mode in found.oscillators:
             omega, decay = (x.at(u[None])[0] for x in (mode.omega, mode.decay))
@@ -113,13 +112,12 @@ def test_oscillators_and_feedthrough_add_up_to_the_response(moved, rng):
             ):
                 G = np.exp(sigma * flow.time[:, None])
                 if source.load:
-                    G = duhamel(sigma, source.load, flow.time)
+                    (G,) = responses_at_nodes(sigma, source.load, flow.time, 0)
                 total += source.read(sigma, G) * factor
         for term in found.truncated:
             total += np.einsum(
                 "so,sot->to", term.participation.at(u[None])[0], term.response_midpoint
             )
-        exact = motion.outputs(flow.time).values
         assert (np.abs(total - exact) <= found.open + 1e-4 * size).all()
         assert (np.abs(total - exact) <= 0.02 * size).all()
 
@@ -130,20 +128,6 @@ def test_branch_and_bound_comes_first_up_to_six_inputs_with_dashpots_alone(first
     inputs = box_around(system, ("k1", "k2", "k3", "m1", "m2", "m3"), 0.02)
     flow = UnitFlow(LinearFlow(system, tuple(inputs), 2.0, 0.02, Exact()), boxes(inputs, [0.0]))
     assert next(Auto()._proofs(flow, [])).name == first
-
-
-def duhamel(sigma, load, time):
-    """∫ exp(σ (t − s)) f(s) ds of one exponent, (T, 1), by a fine trapezoidal rule."""
-    parts = 400
-    fine = np.linspace(0, time[-1], parts * (len(time) - 1) + 1)
-    h = fine[1] - fine[0]
-    f = (load.values(fine[:-1]) + load.before(fine[1:])) / 2
-    grown = np.exp(sigma[0] * h)
-    out = np.zeros(len(fine), complex)
-    weights = (grown - 1) / sigma[0]
-    for k, x in enumerate(f):
-        out[k + 1] = grown * out[k] + weights * x
-    return out[::parts, None]
 
 
 def test_modes_without_oscillation_are_refused():

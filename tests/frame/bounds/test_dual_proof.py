@@ -124,17 +124,6 @@ def test_no_exact_motion_leaves_a_bound_and_peaks_have_small_gaps(case, rng):
     assert (np.nanmedian(found.error[1], 0) <= 0.08 * np.abs(found.upper[1]).max(0)).all()
 
 
-def test_nine_inputs_of_four_storeys_are_proved():
-    model = storeys(4, damping_ratio=0.03, ground=record(), outputs=("q4", "drift1"))
-    fuzzy = each_storey(4) | {"zeta": Triangular(0.02, 0.03, 0.04)}
-    found = envelope(model, fuzzy, duration=2.0, step=0.1, alpha=(0,), progress=False)
-    assert (found.method, found.nature) == ("dual", Nature.GUARANTEED)
-    peaks = np.maximum(found.upper.max(1), -found.lower.min(1))
-    inner = np.maximum(found.inner.upper.max(1), -found.inner.lower.min(1))
-    assert (peaks <= inner * 1.03).all()
-    assert (inner <= peaks).all()
-
-
 def test_a_motion_in_other_units_has_the_same_bounds():
     def bounds(factor):
         shaken = Accelerogram(0.02, factor * record(2.0).samples)

@@ -15,33 +15,24 @@ from alphacut.frame import (
 from alphacut.frame.bounds.box import Box
 from alphacut.frame.bounds.box_proof import ROUNDING_MARGIN
 from alphacut.frame.modes.structure import PointModes
-from alphacut.frame.verification.self_test import structures_at
 from alphacut.fuzzy import Crisp, Interval
 from tests.frame.modes.test_blocks import masses_on_springs
-
-
-def drawn(seed, stiff, ground, **start):
-    """A frame of three storeys, the lowest `stiff` times stiffer, and a box around it."""
-    rng = np.random.default_rng(seed)
-    masses, springs = rng.uniform(1e4, 5e4, 3), rng.uniform(3e7, 1e8, 3)
-    springs[0] *= stiff
-    frame = StoreyFrame(
-        masses=masses,
-        stiffness=springs,
-        damping_ratio=0.02,
-        ground=ground,
-        outputs=("q3", "drift2", "v1", "a2"),
-        **start,
-    )
-    names = ("k1", "k2", "k3", "m1", "m2", "m3")
-    centre, time = np.r_[springs, masses], np.arange(61) * 0.017
-    return frame, Box(frame, names, time, 0.9 * centre, 1.1 * centre), rng
-
+from tests.frame.motions import judged_motions, off_chords
 
 RECORD = Accelerogram(0.02, np.random.default_rng(2).normal(size=40))
 
 
-STARTED = {"q0": (0.01, 0.0, 0.02), "v0": (0.1, -0.5, 0.2)}
+def drawn(rng):
+    """A frame of three storeys that starts while the ground moves."""
+    return StoreyFrame(
+        masses=rng.uniform(1e4, 5e4, 3),
+        stiffness=rng.uniform(3e7, 1e8, 3),
+        damping_ratio=0.02,
+        ground=RECORD,
+        outputs=("q3", "drift2", "v1", "a2"),
+        q0=(0.01, 0.0, 0.02),
+        v0=(0.1, -0.5, 0.2),
+    )
 
 
 @pytest.mark.parametrize("kind", ["dashpots", "one mode without oscillation", "stiff storey"])
@@ -70,17 +61,14 @@ def test_motions_are_those_of_the_judge(kind, rng):
     )
     names, time = ("k1", "m2"), np.arange(61) * 0.017
     points = np.array([springs[0], masses[1]]) * rng.uniform(0.9, 1.1, (5, 2))
-    judged = np.stack([x.outputs(time).values for x in structures_at(frame, names, points)])
+    judged = judged_motions(frame, points, names, time)
     size = ROUNDING_MARGIN * np.abs(judged).max((0, 1))
     modes = PointModes.of_system(frame, names, points)
     assert (np.abs(modes.response(time) - judged[0]) <= size).all()
     point, node, output = rng.integers(5, size=40), rng.integers(61, size=40), np.arange(40) % 4
     found = modes.values(point, node, output, time)
     assert (np.abs(found - judged[point, node, output]) <= size[output]).all()
-    fine = np.linspace(0, time[-1], 8 * 60 + 1)
-    values = modes.response(fine)
-    chords = np.array([np.interp(fine, time, x) for x in values[::8].T]).T
-    off = np.abs(values - chords)[1:].reshape(60, 8, -1).max(1)
+    off = off_chords(modes.response(np.linspace(0, time[-1], 8 * 60 + 1)), 8)
     assert (off <= modes.interpolation_error(time)[1:] + size).all()
 
 
@@ -95,20 +83,19 @@ def test_equal_frequencies_do_not_lift_the_rounding():
 
 def test_the_margin_alone_holds_the_judges_motion_at_crisp_inputs(rng):
     """Guaranteed and attained bounds are one motion there, from which the judge's differs."""
-    frame = drawn(int(rng.integers(1000)), 1, RECORD, **STARTED)[0]
+    frame = drawn(rng)
     value = frame.parameters["k1"]
     given = {"duration": 1.02, "step": 0.017, "alpha": [0.0], "progress": False}
     found = envelope(frame, {"k1": Crisp(value)}, DualProof(workers=1), **given)
-    (judge,) = structures_at(frame, ("k1",), np.array([[value]]))
-    values = judge.outputs(found.time).values
+    (values,) = judged_motions(frame, np.array([[value]]), ("k1",), found.time)
     assert (values <= found.upper[0]).all()
     assert (values >= found.lower[0]).all()
     peak = np.abs(values).max(0)
     assert (np.ptp([found.lower[0], found.upper[0]], axis=0).max(0) <= 1e-8 * peak).all()
 
 
-def test_a_gap_below_what_rounding_may_be_is_refused():
-    frame, _, _ = drawn(1, 1, RECORD)
+def test_a_gap_below_what_rounding_may_be_is_refused(rng):
+    frame = drawn(rng)
     value = frame.parameters["k1"]
     given = {"duration": 0.34, "step": 0.017, "alpha": [0.0], "progress": False}
     with pytest.raises(UnprovedError, match="rounding of the response may be"):

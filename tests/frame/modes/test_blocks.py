@@ -43,6 +43,7 @@ from alphacut.frame.response.tables import (
     grid_over,
     response_ranges,
 )
+from tests.frame.motions import off_chords
 
 TIGHT = 0.5
 """Share of a bound that something reaches: half the bound would be passed."""
@@ -126,23 +127,8 @@ def is_tight(off, bound):
     return (TIGHT * bound < off).all() and (off <= bound * (1 + 1e-9)).all()
 
 
-def frame_in_box(storeys=4, width=0.05, **values):
-    """A frame with a stiffness and a mass a storey, and its structure over the box."""
-    own = StoreyFrame(
-        masses=(2e4,) * storeys,
-        stiffness=(3e7,) * storeys,
-        v0=(1.0,) * storeys,
-        damping_ratio=0.03,
-        **values,
-    )
-    names = tuple(f"{kind}{z + 1}" for kind in "km" for z in range(storeys))
-    centre = np.array([own.parameters[name] for name in names])
-    radius = width * centre
-    return own, names, centre, radius, over_box(own, names, centre - radius, centre + radius)
-
-
 def all_blocks(structure):
-    """All blocks of a structure."""
+    """All blocks of a structure over a box."""
     centre, used = centred_matrices(structure.mass, structure.stiffness)
     return enclose_subspaces(centre, used, centre.mode_count)
 
@@ -151,19 +137,18 @@ def test_modes_of_crisp_matrices_are_enclosed_though_rounding_is_all_they_leave(
     for storeys in (2, 3, 4) * 7:
         masses, stiffness = rng.uniform([[0.5], [500.0]], [[2.0], [2000.0]], (2, storeys))
         frame = StoreyFrame(masses=masses, stiffness=stiffness, outputs=("q1",))
-        model = over_box(frame, ("q1_0",), np.array([-1.0]), np.array([1.0]))
-        centre, used = centred_matrices(model.mass, model.stiffness)
-        found = enclose_subspaces(centre, used, storeys)
+        found = all_blocks(over_box(frame, ("q1_0",), np.array([-1.0]), np.array([1.0])))
         enclosed = [mode for block in found.blocks for mode in block.modes]
         assert sorted(enclosed) == list(range(storeys))
         assert max(block.relative_error for block in found.blocks) < 1e-9
 
 
 def test_half_of_the_range_of_eigenvalues_would_not_do():
-    own, _, _, _, structure = frame_in_box(1, 0.1)
+    own = StoreyFrame(masses=(2e4,), stiffness=(3e7,), v0=(1.0,), damping_ratio=0.03)
     p = {name: TaylorModel.constant(x, 1) for name, x in own.parameters.items()}
-    loose = {name: p[name].widened(0.1 * own.parameters[name]) for name in ("k1", "m1")}
-    for one in (structure, classical_structure(own, p | loose)):
+    widths = {name: 0.1 * own.parameters[name] for name in ("k1", "m1")}
+    loose = p | {name: p[name].widened(width) for name, width in widths.items()}
+    for one in (over(own, widths)[0], classical_structure(own, loose)):
         found = all_blocks(one)
         assert found.eigenvalue_low[0] == pytest.approx(3e7 / 2e4 * 0.9 / 1.1)
         assert found.eigenvalue_high[0] == pytest.approx(3e7 / 2e4 * 1.1 / 0.9)
@@ -201,7 +186,7 @@ def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
         most = np.maximum((1 - start) * side * waves, (1 + start) * side * waves).max(-1).sum(-1)
         off = (most - side * middle)[parts::parts]
         assert is_tight(off, bounds[column].upper[1:] - side * middle[parts::parts])
-    off = np.abs(middle - np.interp(fine, time, middle[::parts]))[1:].reshape(-1, parts).max(1)
+    off = off_chords(middle, parts)
     stray = level.interpolation_error()[1:, 0]
     assert (off <= stray).all()
     assert (off > TIGHT * stray).any()
@@ -479,32 +464,19 @@ def test_coupling_within_a_block_attains_its_bounds_at_nodes_and_between(rng):
     at_nodes = np.abs(coupled(time))
     assert (at_nodes <= added[:, 0] + 1e-12).all()
     assert (at_nodes[-10:] >= 0.9 * added[-10:, 0]).all()
-    middles = (time[1:] + time[:-1]) / 2
-    between = np.abs(coupled(middles) - (coupled(time[1:]) + coupled(time[:-1])) / 2)
+    between = off_chords(coupled(np.linspace(time[0], time[-1], 2 * len(time) - 1)), 2)
     assert (between <= deviation[1:, 0] + 1e-12).all()
     assert (between[-10:] >= 0.8 * deviation[-10:, 0]).all()
 
 
-def block_with_modal_masses(masses, outputs, sources):
-    """A block of two modes with L = 1 and N = `masses`, read by a and set in motion by β.
-
-    N is 1 at the midpoint of the box, and as given at u = 1.
-    """
-    unit = TaylorModel.constant(np.eye(2), inputs=1)
-    modal_mass = TaylorModel((unit.parts[0], (masses - np.eye(2))[None]), np.zeros((2, 2)), 1)
-    block = Block(np.arange(2), unit, unit, unit, modal_mass)
-    participation = unit.like(sources[:, np.newaxis])
-    return BlockParticipation(
-        block,
-        output_modes=unit.like(outputs[:, np.newaxis]),
-        modal_forces=modal_mass @ participation,
-        source_participation=participation,
-    )
-
-
 def test_a_block_whose_modal_masses_may_be_singular_is_refused():
-    masses = np.array([[1.0, 1.0], [1.0, 1.0]])
-    of_block = block_with_modal_masses(masses, np.ones(2), np.ones(2))
+    """They are 1 at the midpoint of the box, and all entries are at u = 1."""
+    unit = TaylorModel.constant(np.eye(2), inputs=1)
+    masses = TaylorModel((unit.parts[0], 1.0 - np.eye(2)[None]), np.zeros((2, 2)), 1)
+    ones = unit.like(np.ones((2, 1)))
+    of_block = BlockParticipation(
+        Block(np.arange(2), unit, unit, unit, masses), ones, masses @ ones, ones
+    )
     structure = SimpleNamespace(output_factors=TaylorModel.constant(np.ones(1), 1))
     with pytest.raises(UnprovedError, match="singular"):
         _coupling_factors(structure, of_block)

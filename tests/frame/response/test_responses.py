@@ -20,6 +20,7 @@ from alphacut.frame.response.duhamel import (
 )
 from alphacut.frame.response.tables import LoadTable, Oscillators, Source, grid_over
 from tests.frame import test_forces
+from tests.frame.motions import off_chords
 
 UNIT = 2.0**-53
 """Relative error of one rounding."""
@@ -246,8 +247,7 @@ def test_responses_are_those_of_a_fine_march_and_stray_as_stated():
             wide = at_nodes.responses(moved, order)
             fine = Oscillators(grid, time, {order}).responses(moved, order).value
             assert np.allclose(fine[::parts], wide.value, atol=1e-12 * np.abs(fine).max())
-            line = np.array([np.interp(time, coarse, x) for x in wide.value.reshape(120, -1).T]).T
-            off = np.abs(fine.reshape(len(time), -1) - line)[1:].reshape(119, -1).max(1)
+            off = off_chords(fine.reshape(len(time), -1), parts).max(1)
             bound = at_nodes.line_deviation(moved, order)[1:]
             assert (off <= bound + 1e-13).all()
             assert (off > TIGHT * bound).any()
@@ -256,15 +256,18 @@ def test_responses_are_those_of_a_fine_march_and_stray_as_stated():
 # chords between nodes
 
 
-def test_no_history_strays_farther_from_its_chords_than_is_said(rng):
+@pytest.mark.parametrize("kind", ["any", "a sine that reaches its chord within steps"])
+def test_no_history_strays_farther_from_its_chords_than_is_said(kind, rng):
     for _ in range(60):
-        history, time = test_forces.random_history(rng), np.arange(30) * rng.uniform(0.01, 0.2)
-        fraction = np.arange(1, 64)[:, None] / 64
-        values = history.values(time)
-        inside = history.values(time[:-1] + fraction * np.diff(time))
-        chord = values[:-1] + fraction * np.diff(values)
-        off = np.abs(inside - chord).max(0)
-        assert (off <= load_deviation(history, time)[1:] + 1e-9 * history.extremes[0]).all()
+        history, step = test_forces.random_history(rng), rng.uniform(0.01, 0.2)
+        if kind != "any":
+            omega = 10 ** rng.uniform(-1, 2)
+            step = rng.uniform(0.01, 0.45) / omega
+            history = History.harmonic(omega / 2 / np.pi, rng.uniform(0, 6))
+        fine = np.arange(64 * 30 + 1) * step / 64
+        off = off_chords(history.values(fine), 64)
+        bound = load_deviation(history, fine[::64])[1:]
+        assert (off <= bound + 1e-9 * history.extremes[0]).all()
 
 
 PARTS, TIME = 40, np.linspace(0, 1.2, 25)
@@ -276,14 +279,7 @@ LOADS = {
 }
 
 
-def off_chords(sigma, load, order, kappa):
-    """Largest distance of Re κ σ^order ρ from the chord of each step, shape (steps,)."""
-    fine = np.linspace(TIME[0], TIME[-1], PARTS * (len(TIME) - 1) + 1)
-    rho = np.exp(sigma * fine[:, None])
-    if load is not None:
-        rho = responses_at_nodes(sigma, load, fine, 0)[0]
-    y = (kappa * sigma**order * rho).real.sum(1)
-    return np.abs(y - np.interp(fine, TIME, y[::PARTS]))[1:].reshape(-1, PARTS).max(1)
+FINE = np.linspace(TIME[0], TIME[-1], PARTS * (len(TIME) - 1) + 1)
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])
@@ -292,7 +288,11 @@ def test_a_mode_alone_strays_as_far_as_its_magnitude_says(load, order, rng):
     """Also while a load has hardly moved it yet."""
     grid = grid_over((omega := rng.uniform(5, 30),) * 2, (0.05, 0.05), (4, 2))
     bound = line_deviations(grid, LOADS[load], TIME, (order,))[order][1, 1:]
-    off = off_chords(np.array([-0.05 + 1j]) * omega, LOADS[load], order, 1 / (1j * omega))
+    sigma = (-0.05 + 1j) * omega
+    rho = np.exp(sigma * FINE)
+    if LOADS[load]:
+        rho = responses_at_nodes(np.array([sigma]), LOADS[load], FINE, 0)[0, :, 0]
+    off = off_chords((sigma**order * rho).imag / omega, PARTS)
     assert (off <= bound * (1 + 1e-9) + 1e-15).all()
 
 
@@ -307,9 +307,7 @@ def test_bounds_over_a_coarse_grid_fall_with_the_step_where_samples_lie_within(r
         fine = np.linspace(0, time[-1], 8 * len(time) - 7)
         w, q = rng.uniform(*omega, 5), rng.uniform(*quotient, 5)
         rho = responses_at_nodes((-q + 1j) * w, load, fine, 0)[0]
-        y = (rho / (1j * w)).real.T
-        chords = [np.interp(fine, time, x[::8]) for x in y]
-        assert np.abs(y - chords).max() <= bounds[-1]
+        assert off_chords((rho / (1j * w)).real, 8).max() <= bounds[-1]
     assert bounds[1] < bounds[0] / 8
 
 
@@ -330,13 +328,10 @@ def test_resonance_between_two_points_of_a_grid_is_in_the_bound(order, samples_i
     width = rng.uniform(0.9, 1.05) * 2 * np.pi / (TIME[-1] * middle)
     grid = grid_over((middle * (1 - width), middle * (1 + width)), (0.0, 0.0), (2, 1))
     bound = line_deviations(grid, load, TIME, (order,))[order][1, 1:]
-    fine = np.linspace(TIME[0], TIME[-1], PARTS * (len(TIME) - 1) + 1)
-    for omega in middle * np.linspace(1 - width, 1 + width, 11):
-        sigma = np.array([1j * omega])
-        rho = responses_at_nodes(sigma, load, fine, 0)[0, :, 0]
-        y = (sigma**order * rho).imag / omega
-        off = np.abs(y - np.interp(fine, TIME, y[::PARTS]))[1:].reshape(-1, PARTS).max(1)
-        assert (off <= bound * (1 + 1e-9) + 1e-15).all()
+    omega = middle * np.linspace(1 - width, 1 + width, 11)
+    (rho,) = responses_at_nodes(1j * omega, load, FINE, 0)
+    off = off_chords(((1j * omega) ** order * rho).imag / omega, PARTS).max(1)
+    assert (off <= bound * (1 + 1e-9) + 1e-15).all()
 
 
 def samples_that_vanish_on_a_grid(functionals, at_middle):
@@ -368,20 +363,7 @@ def test_what_a_response_is_between_points_at_which_it_and_its_curvature_vanish(
     values = np.stack(columns, -1)  # (value, curvature; points; samples)
     on_grid = np.concatenate([values[0, :2], values[1, :2]])
     load = History(step, samples_that_vanish_on_a_grid(on_grid, values[0, 2]))
-    fine = np.linspace(TIME[-2], TIME[-1], 41)
-    rho = responses_at_nodes(points[2:], load, np.append(TIME[:-2], fine), 0)[0, -41:, 0]
-    off = np.abs(rho - np.linspace(rho[0], rho[-1], 41)).max()
-    assert off > 1e-6 * np.abs(rho).max()
+    rho = responses_at_nodes(points[2:], load, FINE, 0)[0, :, 0]
+    off = off_chords(rho, PARTS)[-1]
+    assert off > 1e-6 * np.abs(rho[-PARTS:]).max()
     assert off <= line_deviations(grid, load, TIME, (0,))[0][0, -1]
-
-
-def test_the_bend_of_a_harmonic_force_counts_where_its_pieces_end_on_the_line(rng):
-    for _ in range(40):
-        omega = 10 ** rng.uniform(-1, 2)
-        step, count = rng.uniform(0.01, 0.45) / omega, int(rng.integers(1, 60))
-        force = History.harmonic(omega / 2 / np.pi, rng.uniform(0, 6))
-        time = np.arange(count + 1) * step
-        bound = load_deviation(force, time).max()
-        fine = np.linspace(0, time[-1], 40 * count + 1)
-        chord = np.interp(fine, time, force.values(time))
-        assert bound >= np.abs(force.values(fine) - chord).max()

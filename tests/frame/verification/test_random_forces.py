@@ -13,9 +13,8 @@ from alphacut.frame import (
     envelope,
 )
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.verification.self_test import structures_at
 from alphacut.fuzzy import Interval
-from tests.frame.motions import random_points
+from tests.frame.motions import judged_motions, random_points
 
 MOTIONS = 12
 RANDOM, EQUAL = 20, 47
@@ -85,8 +84,7 @@ def ratios_of_a_random_frame(method, rng):
     is_guaranteed = bounds.nature == "guaranteed"
     assert is_guaranteed or method.name == "graph-follower"
     error = 0.0 if is_guaranteed else bounds.error[0]
-    for motion in structures_at(frame, tuple(inputs), random_points(inputs, MOTIONS, rng)):
-        values = motion.outputs(times).values
+    for values in judged_motions(frame, random_points(inputs, MOTIONS, rng), inputs, times):
         nodes = values[:: fractions.shape[1]]
         inner = values[:-1].reshape(steps, -1, frame.floors)
         rounding = 1e-9 * np.abs(values).max(0)

@@ -12,11 +12,11 @@ from alphacut.frame.verification.self_test import (
     ContradictionError,
     Trial,
     fractions_of_steps,
-    inputs_at_peaks,
     structures_at,
     with_motions_tested,
 )
 from alphacut.fuzzy import Crisp, FailedError, Triangular
+from tests.frame.motions import judged_motions, off_chords
 
 INPUTS = {"k1": Triangular(3.9e6, 4e6, 4.1e6), "m2": Triangular(990.0, 1e3, 1020.0)}
 METHODS = [Proof(gap=1e-5), DualProof(gap=1e-3)]
@@ -44,13 +44,6 @@ def found():
 
 def narrower(found):
     return replace(found, lower=0.98 * found.lower, upper=0.98 * found.upper)
-
-
-def smaller(found):
-    """Proved bounds that are too small, past the comparison with what is attained."""
-    faulty = copy(found)
-    vars(faulty)["proved"] = found.proved._replace(upper=0.98 * found.proved.upper)
-    return faulty
 
 
 def straight(found):
@@ -87,24 +80,6 @@ def test_a_fault_in_the_result_raises(monkeypatch, found, method, change, words)
         motion(frame(), INPUTS, method=method)
 
 
-@pytest.mark.parametrize(
-    ("change", "check"), [(smaller, "require_inside"), (straight, "require_interpolation_error")]
-)
-def test_each_check_alone_sees_its_fault(found, change, check):
-    found = found["proof"]
-    faulty = change(found)
-    others = {"require_inside", "require_interpolation_error", "require_attained"}
-    points = inputs_at_peaks(found, 0)
-    cuts = np.array([[x.cut(alpha) for x in found.inputs.values()] for alpha in found.alpha])
-    with pytest.MonkeyPatch.context() as patch:
-        for other in others - {check}:
-            patch.setattr(Trial, other, lambda *_: None)
-        with pytest.raises(ContradictionError):
-            Trial(faulty, cuts[..., 0], cuts[..., 1]).require_agreement(
-                points, structures_at(frame(), tuple(faulty.inputs), points)
-            )
-
-
 def test_a_deviation_between_nodes_a_quarter_too_small_is_refused(rng):
     """Whatever the record: three quarters of what an exact motion strays is less than it strays.
 
@@ -114,13 +89,9 @@ def test_a_deviation_between_nodes_a_quarter_too_small_is_refused(rng):
     system = replace(frame(), ground=Accelerogram(0.03, rng.normal(size=40)))
     found = motion(system, inputs, method=DualProof(), alpha=(1.0,))
     wide = np.abs(found.upper).max(1, keepdims=True) * np.ones_like(found.upper)
-    (exact,) = structures_at(system, tuple(found.inputs), np.array([[4e6]]))
-    deviation = np.zeros_like(found.between)
-    nodes = exact.outputs(found.time)[0]
-    for fraction in np.arange(1, 40) / 40:
-        inside = exact.outputs(found.time[:-1] + np.diff(found.time) * fraction)[0]
-        chord = (1 - fraction) * nodes[:-1] + fraction * nodes[1:]
-        deviation[1:] = np.maximum(deviation[1:], np.abs(inside - chord))
+    fine = np.linspace(0, found.time[-1], 40 * len(found.time) - 39)
+    (exact,) = judged_motions(system, np.array([[4e6]]), found.inputs, fine)
+    deviation = np.append(found.between[:1], off_chords(exact, 40), axis=0)
     faulty = replace(
         found, lower=-3 * wide, upper=3 * wide, inner=None, outer=None, between=0.75 * deviation
     )
@@ -130,15 +101,11 @@ def test_a_deviation_between_nodes_a_quarter_too_small_is_refused(rng):
 
 def between_too_small(found, exact):
     """Bounds at nodes that are the exact motion's, and 3/4 of what it exceeds both ends by."""
-    nodes = exact.outputs(found.time)[0]
-    highest = np.maximum(nodes[1:], nodes[:-1])
-    for fraction in np.arange(1, 40) / 40:
-        inside = exact.outputs(found.time[:-1] + np.diff(found.time) * fraction)[0]
-        highest = np.maximum(highest, inside)
-    over = np.zeros_like(nodes)
-    over[1:] = highest - np.maximum(nodes[1:], nodes[:-1])
-    size = np.abs(nodes).max()
-    lower = np.full_like(found.lower, -3 * size)
+    fine = exact.outputs(np.linspace(0, found.time[-1], 40 * len(found.time) - 39)).values
+    nodes, over = fine[::40], 0.0 * found.between
+    inside = fine[:-1].reshape(len(nodes) - 1, 40, -1).max(1)
+    over[1:] = np.maximum(inside - np.maximum(nodes[1:], nodes[:-1]), 0.0)
+    lower = np.full_like(found.lower, -3 * np.abs(nodes).max())
     return replace(
         found, lower=lower, upper=nodes[None], inner=None, outer=None, between=0.75 * over
     )

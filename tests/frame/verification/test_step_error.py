@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.linalg import eigvalsh, expm
+from scipy.linalg import eigvalsh
 
 from alphacut.frame import (
     Accelerogram,
@@ -20,8 +20,10 @@ from alphacut.frame import (
     envelope,
     pendulum,
 )
+from alphacut.frame.verification.self_test import structures_at
 from alphacut.frame.verification.step_error import MARGIN, node_deviation
 from alphacut.fuzzy import FailedError, Interval, Triangular
+from tests.frame.motions import judged_motions, off_chords
 from tests.refused import refuses
 
 DUFFING = LagrangianSystem(
@@ -146,85 +148,40 @@ def test_modes_that_turn_several_times_within_a_step_are_seen() -> None:
         random = np.random.default_rng(seed)
         stiffness, start = 10 ** random.uniform(5, 6.5, 3), 0.01 * random.normal(size=3)
         frame = StoreyFrame((1e4,) * 3, stiffness=stiffness, q0=start, damping_ratio=0.01)
-        springs = np.diag(stiffness + np.append(stiffness[1:], 0))
-        springs -= np.diag(stiffness[1:], 1) + np.diag(stiffness[1:], -1)
-        highest = np.sqrt(eigvalsh(springs / 1e4)[-1])
-        step, point = random.uniform(15, 50) / highest, np.empty((1, 0))
+        point = np.empty((1, 0))
+        (motion,) = structures_at(frame, (), point)
+        step = random.uniform(15, 50) / np.sqrt(eigvalsh(motion.stiffness / 1e4)[-1])
         found = node_deviation(LinearFlow(frame, (), 12 * step, step, Exact()), point)
         fine = LinearFlow(frame, (), 12 * step, step / 100, Exact()).values(point)[0]
-        fraction = np.linspace(0, 1, 101)[:, None]
-        for j in range(12):
-            inner = fine[100 * j : 100 * (j + 1) + 1]
-            off = abs(inner - inner[0] * (1 - fraction) - inner[-1] * fraction).max(0)
-            assert (off <= found[j + 1]).all(), seed
+        assert (off_chords(fine, 100) <= found[1:]).all(), seed
         assert found.max() < 4 * abs(fine).max()
-
-
-def top_accelerations(masses, stiffness, dampers, samples, factors, times):
-    """Accelerations of the top floor by SciPy's matrix exponential, shape (factors, T).
-
-    Springs and dashpots are those of storeys; `factors` multiply all springs. The force on the top
-    floor is linear between equally spaced samples, begins at t = 0 and ends with the last one; all
-    samples are at some of the equally spaced times.
-    """
-
-    def chain(values):
-        upper = np.append(values[1:], 0.0)
-        return np.diag(values + upper) - np.diag(values[1:], 1) - np.diag(values[1:], -1)
-
-    n, dt = len(masses), times[1]
-    spacing = round(0.1 / dt)
-    n_loaded = spacing * (len(samples) - 1)
-    at_times = np.interp(np.arange(n_loaded + 1) / spacing, np.arange(len(samples)), samples)
-    begin, end = np.zeros((2, len(times)))  # of the force in the interval after each time
-    begin[:n_loaded] = at_times[:-1]
-    end[:n_loaded] = at_times[1:]
-    motions = []
-    for factor in factors:
-        inverse_mass = np.diag(1 / masses)
-        A = np.zeros((2 * n + 2, 2 * n + 2))  # of q, v, the force and its slope
-        A[:n, n : 2 * n] = np.eye(n)
-        A[n : 2 * n, :n] = -inverse_mass @ chain(factor * stiffness)
-        A[n : 2 * n, n : 2 * n] = -inverse_mass @ chain(dampers)
-        A[2 * n - 1, 2 * n] = 1 / masses[-1]
-        A[2 * n, 2 * n + 1] = 1.0
-        step_map = expm(A * dt)
-        state, values = np.zeros(2 * n), []
-        for f, f_end in zip(begin, end, strict=True):
-            full = np.append(state, [f, (f_end - f) / dt])
-            values.append(A[2 * n - 1] @ full)
-            state = (step_map @ full)[: 2 * n]
-        motions.append(values)
-    return np.array(motions)
 
 
 @pytest.mark.parametrize("count", [16, 21], ids=["inner node", "last node"])
 def test_a_force_that_ends_at_a_node_widens_no_step_but_its_own(count, rng):
     """An acceleration jumps with the force, by far more than motions stray in any step."""
-    masses, stiffness = np.array([6e4, 5e4]), np.array([6e7, 3e7])
-    dampers, step, parts, steps = np.array([4e5, 2e5]), 0.02, 20, 100
+    stiffness, step, parts, steps = np.array([6e7, 3e7]), 0.02, 20, 100
     samples = rng.uniform(1.0, 1.6, count)
     samples[-1] = 3.0  # the force rises until it ends, so that motions exceed both nodes there
     gust = History(0.1, samples)
     frame = StoreyFrame(
-        masses,
+        [6e4, 5e4],
         stiffness=stiffness,
-        dampers=dampers,
+        dampers=[4e5, 2e5],
         damper_placement="storey",
         outputs=("a2",),
         loads=[Force(2, 1.2e4, gust)],
     )
-    names, factors = ("k1", "k2"), np.linspace(0.95, 1.05, 5)
+    names, points = ("k1", "k2"), np.linspace(0.95, 1.05, 5)[:, None] * stiffness
     flow = LinearFlow(frame, names, steps * step, step, Exact())
-    found = node_deviation(flow, factors[[0, 2, -1], None] * stiffness)[1:, 0]
+    found = node_deviation(flow, points[[0, 2, -1]])[1:, 0]
     times = np.arange(parts * steps + 1) * (step / parts)
-    exact = top_accelerations(masses, stiffness, dampers, 1.2e4 * samples, factors, times)
-    nodes, x = exact[:, ::parts, None], np.arange(parts) / parts
-    inner = exact[:, :-1].reshape(len(factors), steps, parts)
-    off_chord = np.abs(inner - (1 - x) * nodes[:, :-1] - x * nodes[:, 1:]).max((0, 2))
-    above = inner.max(2) - np.maximum(nodes[:, :-1, 0], nodes[:, 1:, 0])
-    below = np.minimum(nodes[:, :-1, 0], nodes[:, 1:, 0]) - inner.min(2)
-    beyond_ends = np.maximum(above, below).max(0)
+    exact = judged_motions(frame, points, names, times)[..., 0].T
+    off_chord = off_chords(exact, parts).max(1)
+    nodes, inner = exact[::parts], exact[:-1].reshape(steps, parts, -1)
+    above = inner.max(1) - np.maximum(nodes[:-1], nodes[1:])
+    below = np.minimum(nodes[:-1], nodes[1:]) - inner.min(1)
+    beyond_ends = np.maximum(above, below).max(1)
     end = round(gust.step * (len(samples) - 1) / step)  # node at which the force ends
     has_jump = np.arange(1, steps + 1) == end
     assert has_jump.any()
