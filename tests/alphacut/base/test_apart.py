@@ -53,8 +53,8 @@ def read(tmp_path, monkeypatch):
 
 def test_arrays_and_texts_come_back_from_a_process_without_variables_of_mpi(read, monkeypatch):
     monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "0")
-    found = read("arrays", factor=2.0)
-    assert found["numbers"].tolist() == [0, 2, 4]
+    found = read("arrays", factor=0.1)
+    assert np.array_equal(found["numbers"], 0.1 * np.arange(3.0))
     assert found["texts"].tolist() == ["a file"]
 
 
@@ -96,7 +96,3 @@ def test_a_reader_ends_with_the_process_that_started_it(read, tmp_path):
         time.sleep(0.05)
     os.kill(int(told), signal.SIGKILL)
     pytest.fail("the reader goes on alone")
-
-
-def test_numbers_keep_their_bits(read):
-    assert np.array_equal(read("arrays", factor=0.1)["numbers"], 0.1 * np.arange(3.0))

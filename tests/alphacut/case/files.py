@@ -1,10 +1,13 @@
 """Files that the base cases of `refused/` name, each function for some of them."""
 
+from pathlib import Path
+
 import numpy as np
 import scipy.io
 import scipy.sparse
 
 from tests.alphacut.small import table_of, written
+from tests.frame.structures.test_affine import beam
 
 
 def matrices(folder):
@@ -65,11 +68,25 @@ def components(folder):
     np.save(folder / "stiffness.npy", STIFFNESS)
 
 
+def exports(folder):
+    """Masses of two of three nodes, and stiffnesses of nine digits for some moduli and springs."""
+    scipy.io.mmwrite(folder / "mass.mtx", np.diag([0, 0, 40.0, 0.5, 60.0, 0.7]))
+    moduli = np.array([210e9, 420e9, 315e9, 210e9, 210e9, 300e9])
+    springs = np.array([3.7e6, 3.7e6, 3.7e6, 7.4e6, 5.5e6, 5e6])
+    for number, values in enumerate(zip(moduli, springs, strict=True)):
+        scipy.io.mmwrite(folder / f"k{number}.mtx", beam(*values), precision=9)
+
+
+def meshes(folder):
+    """The shipped meshes."""
+    (folder / "meshes").symlink_to(Path(__file__).parents[3] / "meshes")
+
+
 def prepared(folder, name, changes=(), texts=None):
     """A base case with texts replaced, beside its files."""
     table = table_of(name)
     for writer in table.get("files", ()):
         globals()[writer](folder)
-    for file, text in (texts or {}).items():
+    for file, text in (table.get("texts", {}) | (texts or {})).items():
         (folder / file).write_text(text, encoding="utf-8")
     return written(folder, table["case"], **dict(changes))

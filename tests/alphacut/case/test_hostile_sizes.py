@@ -8,7 +8,7 @@ from alphacut.commands.motion_text import modes_document, modes_text
 from alphacut.frame import read_spectrum
 from alphacut.frame.structures.linear import NominalModes
 from alphacut.report.page import render_template
-from tests.alphacut.small import FRAME, refusals, told_by, written
+from tests.alphacut.small import FRAME, refusals, written
 from tests.refused import refuses
 
 
@@ -23,11 +23,6 @@ def test_a_key_of_thousands_of_parts_is_refused_before_it_is_parsed(tmp_path):
         assert "of more than 30 parts" in told
         assert f"case.toml:{len(FRAME.splitlines()) + 3}" in told
         assert peak < 50e6
-
-
-def test_texts_with_dots_are_no_keys(tmp_path):
-    title = "U.S. frame of A.B.C. Co., v. 1.2.3.4"
-    told_by("check", written(tmp_path, FRAME, **{"One floor": title}), "--quiet")
 
 
 def test_thousands_of_unknown_keys_are_counted_and_not_listed(tmp_path):
@@ -63,12 +58,6 @@ def test_an_eigenvalue_problem_without_solution_does_not_print_the_case(tmp_path
     assert len(told) == 1
     assert "Eigenvalues did not converge" in told[0]
     assert "masses" not in told[0]
-
-
-def test_a_pattern_of_records_does_not_look_through_all_folders(tmp_path):
-    text = FRAME.replace('displacements = "10 mm"\n', "") + '[records]\nfiles = ["**/*.AT2"]\n'
-    told = refusals(written(tmp_path, text))
-    assert any("** would look through all folders" in line for line in told)
 
 
 def test_the_head_of_a_spectrum_is_not_searched_for_long(tmp_path):

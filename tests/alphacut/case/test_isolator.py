@@ -6,22 +6,20 @@ import pytest
 from alphacut.case.content import load
 from alphacut.frame import BilinearIsolator
 from alphacut.frame.dynamics.yielding import YieldingFlow
-from tests.alphacut.small import table_of
+from tests.alphacut.case.files import prepared
 from tests.refused import refuses
 
-CASE = table_of("isolators")["case"]
 STRENGTH = 'strength_ratio = "5 %"'
 FACTORS = f"{STRENGTH}, lambda_min = 0.8, lambda_max = 1.3"
 
 
-def written(folder, isolator):
-    path = folder / "case.toml"
-    path.write_text(CASE.replace("ISOLATOR", isolator), encoding="utf-8")
-    return path
+def structure_of(folder, isolator):
+    """The structure of a case with some keys of its isolators."""
+    return load(prepared(folder, "isolators", {"ISOLATOR": isolator})).content.structure
 
 
 def test_stiffness_after_yielding_has_the_period_and_the_force_the_strength(tmp_path):
-    structure = load(str(written(tmp_path, FACTORS))).content.structure
+    structure = structure_of(tmp_path, FACTORS)
     k = 100e3 * np.pi**2 / 0.2
     force = 0.05 * 100e3 * 9.80665 / 0.8
     assert structure.numbers["k1"].support == pytest.approx((0.8 * k, 1.3 * k))
@@ -29,13 +27,13 @@ def test_stiffness_after_yielding_has_the_period_and_the_force_the_strength(tmp_
     assert structure.numbers["fy1"].support == pytest.approx((0.8 * force, 1.3 * force))
     assert structure.model.hardening == (0.2, 1.0)
     by_force = FACTORS.replace(STRENGTH, f'strength = "{0.05 * 100e3 * 9.80665} N"')
-    same = load(str(written(tmp_path, by_force))).content.structure
+    same = structure_of(tmp_path, by_force)
     assert same.numbers["fy1"].nominal == pytest.approx(force)
 
 
 def test_a_linked_factor_of_k1_changes_stiffness_and_strength(tmp_path):
-    linked = load(str(written(tmp_path, f"{FACTORS}, linked = true"))).content.structure
-    free = load(str(written(tmp_path, FACTORS))).content.structure
+    linked = structure_of(tmp_path, f"{FACTORS}, linked = true")
+    free = structure_of(tmp_path, FACTORS)
     assert "fy1" not in linked.numbers
     k = linked.numbers["k1"].nominal
     force = free.numbers["fy1"].nominal

@@ -37,7 +37,6 @@ def test_keys_of_one_section_are_printed_and_no_other():
     assert re.findall("^## (.*)", printed, re.MULTILINE) == ["`[records]`", "`[records.spectrum]`"]
     assert "- `unit`: " in printed
     assert 'default "none".' in printed
-    assert "did you mean records?" in told_by("keys", "record", status=2)
 
 
 def test_allowed_values_of_a_key_are_told_in_words():
@@ -48,11 +47,7 @@ def test_allowed_values_of_a_key_are_told_in_words():
     assert allowed_values(keys["title"]) == ""
 
 
-def test_entries_of_tables_with_free_names_are_changed_and_others_suggested():
-    case = "cases/plane-frame.toml"
-    assert "matrices.parameters.Ec 1.14 … 1.26" in " ".join(
-        told_by("check", case, "--set", 'matrices.parameters.Ec="1.2 ± 5 %"').split()
-    )
-    assert "did you mean matrices.parameters?" in told_by(
-        "check", case, "--set", "matrices.parametrs.Ec=1.2", status=2
-    )
+def test_entries_of_tables_with_free_names_are_changed():
+    change = 'matrices.parameters.Ec="1.2 ± 5 %"'
+    told = told_by("check", "cases/plane-frame.toml", "--set", change)
+    assert "matrices.parameters.Ec 1.14 … 1.26" in " ".join(told.split())

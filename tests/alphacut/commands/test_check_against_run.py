@@ -77,7 +77,7 @@ CHANGES = {
         "identify.frequency_deviation=0.03", 'envelope.fuzzy=["m"]', 'identify.learn=["l"]',
     ],
     "image": [
-        "cell.threshold=[300]", "cell.threshold=[130]", "cell.labels=[50, 150]",
+        "cell.threshold=[300]", "cell.threshold=[130]",
         "modulus.alpha=[1]", 'cell.pixel=["1 µm", "2 µm"]', "cell.remove=noise",
     ],
     "circles": [
@@ -106,40 +106,15 @@ def place(tmp_path):
 
 def test_what_check_passes_run_takes(place, capfd, rng):
     seed = int(rng.integers(10**9))
-    trials, passed = int(os.environ.get("TRIALS", "1")), 0
-    for trial in range(seed, seed + trials):
+    for trial in range(seed, seed + int(os.environ.get("TRIALS", "1"))):
         draw = random.Random(trial)
         kind = draw.choice(sorted(TEXTS))
         changes = draw.sample(CHANGES[kind], draw.choice([1, 1, 2]))
-        if kind == "image" and any("labels" in change for change in changes):
-            continue
         words = [str(written(place, TEXTS[kind])), *(f"--set={change}" for change in changes)]
-        checked = main(["check", *words, "--quiet"])
-        capfd.readouterr()
-        passed += checked == 0
-        if checked == 0:
+        if main(["check", *words, "--quiet"]) == 0:
+            capfd.readouterr()
             ran = main(["run", *words, "--quiet", "--no-figures", f"--out={place}/{trial}"])
-            _, err = capfd.readouterr()
-            print(kind, changes, checked, ran, err)
-            assert ran != 2, (trial, kind, changes, err)
-        else:
-            print(kind, changes, checked)
-    print(f"seed {seed}: {passed} of {trials} passed check")
-
-
-REFUSED = {
-    "frame": ("tolerances.most=20", "tolerances.most"),
-    "both": ("modulus.alpha=[0.5, 1]", "modulus.alpha"),
-    "identify": ("envelope.alpha=[0, 1]", "envelope.alpha"),
-    "image": ("cell.threshold=[300]", "threshold"),
-    "circles": ('microstructure.circles.size=["1 mm", "1 mm"]', "circles.csv, row"),
-}
-
-
-@pytest.mark.parametrize(("kind", "change", "key"), [(k, *v) for k, v in REFUSED.items()])
-def test_check_refuses_what_run_would(place, kind, change, key):
-    words = [str(written(place, TEXTS[kind])), "--set", change]
-    assert key in told_by("check", *words, status=2)
+            assert ran != 2, (trial, kind, changes, capfd.readouterr().err)
 
 
 def test_a_record_longer_than_the_motion_is_said(place):

@@ -61,8 +61,18 @@ def image_dataset(young, shape=(4, 6)):
     return xarray.Dataset(variables, {"alpha": [0.0, 1.0], "bound": ["lower", "upper"]}, attributes)
 
 
-@pytest.mark.parametrize("shape", [(4, 6), (2, 4, 6)])
-def test_an_image_has_scales_a_legend_and_its_open_pixels(shape):
+VOLUME = [("y (µm)", "z (µm)", "x = 3 µm"), ("x (µm)", "z (µm)", "y = 6 µm"),
+          ("x (µm)", "y (µm)", "z = 2 µm")]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("shape", "across", "share"),
+    [
+        ((4, 6), [("x (µm)", "y (µm)", "")], "4.17% of the pixels"),
+        ((2, 4, 6), VOLUME, "2.08% of the voxels"),
+    ],
+)
+def test_an_image_has_scales_a_legend_and_its_open_pixels(shape, across, share):
     young = 1e9 * np.array([[20.0, 30.0], [24.0, 26.0]])
     with figure_style():
         figure = material.image(image_dataset(young, shape))
@@ -73,14 +83,8 @@ def test_an_image_has_scales_a_legend_and_its_open_pixels(shape):
         legend = [text.get_text() for text in figure.legends[0].get_texts()]
         overlays = [picture.images[1].get_array() for picture in pictures]
         plt.close(figure)
-    across_z = ("x (µm)", "y (µm)", "" if len(shape) == 2 else "z = 2 µm")
-    if len(shape) == 2:
-        assert labels == [across_z]
-    else:
-        across_x, across_y = ("y (µm)", "z (µm)", "x = 3 µm"), ("x (µm)", "z (µm)", "y = 6 µm")
-        assert labels == [across_x, across_y, across_z]
+    assert labels == across
     assert extents[-1] == ((0, 6), (0, 12))
-    share = {2: "4.17% of the pixels", 3: "2.08% of the voxels"}[len(shape)]
     assert legend == ["dark", "bright", f"open at α = 0: {share}"]
     assert [overlay.count() for overlay in overlays] == [1] * len(pictures)
     assert cuts.get_xlabel().startswith("Young's modulus E")
@@ -156,12 +160,17 @@ def test_a_limit_of_zero_leaves_room_for_the_bars_of_others():
     assert max(abs(end) for end in axes.get_xlim()) < 3
 
 
-def test_every_limit_of_a_fragility_is_drawn_with_its_fit_and_the_highest_level_as_a_line(rng):
+def fragility_of(rng, **asked):
+    """Fragility of a floor under three records at random."""
     suite = [Accelerogram(0.02, rng.normal(size=40), name=f"r{x}") for x in range(3)]
     frame = StoreyFrame([2e4], stiffness=[8e6], damping_ratio=0.05)
-    limits = [Limit("drift1", 0.01), Limit("q1", 0.02), Limit("a1", 4.0)]
     times = {"duration": 1.0, "step": 0.02, "alpha": (0, 1), "intensity": "PGA"}
-    answer = fragility(frame, {"k1": Triangular(7.5e6, 8e6, 8.5e6)}, suite, limits, **times)
+    return fragility(frame, {"k1": Triangular(7.5e6, 8e6, 8.5e6)}, suite, **asked, **times)
+
+
+def test_every_limit_of_a_fragility_is_drawn_with_its_fit_and_the_highest_level_as_a_line(rng):
+    limits = [Limit("drift1", 0.01), Limit("q1", 0.02), Limit("a1", 4.0)]
+    answer = fragility_of(rng, limits=limits)
     with figure_style():
         panels = answers.draw_fragility(answer).axes
     titles = [axes.get_title(loc="left") for axes in panels]
@@ -174,11 +183,8 @@ def test_every_limit_of_a_fragility_is_drawn_with_its_fit_and_the_highest_level_
 
 
 def test_damage_states_share_a_figure_with_the_crossings_of_the_records(rng):
-    suite = [Accelerogram(0.02, rng.normal(size=40), name=f"r{x}") for x in range(3)]
-    frame = StoreyFrame([2e4], stiffness=[8e6], damping_ratio=0.05)
     states = {"slight": Limit("drift1", 0.01), "severe": Limit("drift1", 0.02)}
-    times = {"duration": 1.0, "step": 0.02, "alpha": (0, 1), "intensity": "PGA"}
-    answer = fragility(frame, {"k1": Triangular(7.5e6, 8e6, 8.5e6)}, suite, states=states, **times)
+    answer = fragility_of(rng, states=states)
     with figure_style():
         (axes,) = answers.draw_states(answer).axes
     points, fit, _, of_severe, *_ = axes.lines

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import xarray
 
-from alphacut import main
 from alphacut.base.kept_files import digest_of
 from alphacut.io.results import MANIFEST, ResultsFolder, write_arrays
 from tests.alphacut.small import told_by, written
@@ -64,16 +63,12 @@ def linked_file(folder, secret, kind):
 
 @pytest.mark.parametrize("command", ["report", "verify"])
 @pytest.mark.parametrize("kind", ["external storage", "external link"])
-def test_values_of_other_files_are_refused(finished, tmp_path, capsys, command, kind):
+def test_values_of_other_files_are_refused(finished, tmp_path, command, kind):
     secret = tmp_path / "id_rsa"
     secret.write_bytes(b"password of the user")
     replace_arrays(finished, linked_file(tmp_path, secret, kind))
-    arguments = [command, str(finished)]
-    if command == "report":
-        arguments += ["--csv", str(tmp_path / "csv")]
-    capsys.readouterr()
-    assert main(arguments) == 2
-    told = capsys.readouterr().err
+    words = ["--csv", tmp_path / "csv"] if command == "report" else []
+    told = told_by(command, finished, *words, status=2)
     assert len(told.splitlines()) == 1
     assert "envelope_all.nc is no file in the classic format of NetCDF" in told
     assert not list((tmp_path / "csv").glob("*.csv"))

@@ -47,6 +47,13 @@ def finished(tmp_path_factory):
     return case, out, older
 
 
+@pytest.fixture
+def copied(finished, tmp_path):
+    """The case, and a copy of its results."""
+    case, out, _ = finished
+    return case, shutil.copytree(out, tmp_path / "out")
+
+
 def flip(file, draw, _):
     content = bytearray(file.read_bytes())
     for _ in range(draw.choice([1, 1, 30])):
@@ -153,10 +160,8 @@ def test_damaged_results_are_computed_anew_or_refused(finished, tmp_path, kinds,
         check_damage(finished, place, seed + trial, kinds, capfd)
 
 
-def test_fresh_removes_what_is_listed_and_nothing_else(finished, tmp_path):
-    case, out, _ = finished
-    copy = tmp_path / "out"
-    shutil.copytree(out, copy)
+def test_fresh_removes_what_is_listed_and_nothing_else(copied):
+    case, copy = copied
     others = ["samples.db.mine", "notes.nc", "figures/photo.png", "summary.json~"]
     for name in others:
         (copy / name).write_text("precious")
@@ -206,19 +211,17 @@ def test_fresh_does_not_use_a_store_that_it_may_not_remove(finished, tmp_path, c
     assert "listed in no manifest" in capfd.readouterr().err
 
 
-def test_a_file_that_no_manifest_lists_is_not_replaced(tmp_path, capfd):
+def test_a_file_that_no_manifest_lists_is_not_replaced(tmp_path):
     file = tmp_path / "out" / "figures" / "modulus.png"
     file.parent.mkdir(parents=True)
     file.write_text("precious")
     (tmp_path / "out" / "notes.json").write_text("precious")
-    case = written(tmp_path, CELL)
-    assert run(case, tmp_path / "out") == 2
-    assert "with other files; allowed: an empty folder, or one of results" in capfd.readouterr().err
+    words = ("run", written(tmp_path, CELL), "--out", tmp_path / "out")
+    assert "with other files; allowed: an empty folder" in told_by(*words, status=2)
     assert {x.name for x in (tmp_path / "out").iterdir()} == {"figures", "notes.json"}
     ResultsFolder(tmp_path / "out").add_to_list({})
-    assert run(case, tmp_path / "out") == 2
+    assert "no manifest lists" in told_by(*words, status=2)
     assert file.read_text() == "precious"
-    assert "no manifest lists" in capfd.readouterr().err
     with refuses("notes.json"):
         ResultsFolder(tmp_path / "out").put_text("notes.json", "text")
 
@@ -232,10 +235,8 @@ def test_a_manifest_of_another_program_is_left_alone(tmp_path):
     assert [x.name for x in folder.iterdir()] == ["manifest.json"]
 
 
-def test_a_folder_of_figures_that_is_a_link_is_refused(finished, tmp_path):
-    case, out, _ = finished
-    copy, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
-    shutil.copytree(out, copy)
+def test_a_folder_of_figures_that_is_a_link_is_refused(copied, tmp_path):
+    (case, copy), elsewhere = copied, tmp_path / "elsewhere"
     (copy / "figures").rename(elsewhere)
     (copy / "figures").symlink_to(elsewhere)
     before = {x.name: x.read_bytes() for x in elsewhere.iterdir()}
@@ -246,10 +247,8 @@ def test_a_folder_of_figures_that_is_a_link_is_refused(finished, tmp_path):
     assert {x.name: x.read_bytes() for x in elsewhere.iterdir()} == before
 
 
-def test_the_page_does_not_embed_or_write_through_links(finished, tmp_path):
-    _, out, _ = finished
-    copy, secret = tmp_path / "out", tmp_path / "secret.png"
-    shutil.copytree(out, copy)
+def test_the_page_does_not_embed_or_write_through_links(copied, tmp_path):
+    (_, copy), secret = copied, tmp_path / "secret.png"
     secret.write_bytes((copy / "figures" / "modulus.png").read_bytes())
     (copy / "figures" / "modulus.png").unlink()
     (copy / "figures" / "modulus.png").symlink_to(secret)

@@ -61,14 +61,12 @@ def document():
 
 def test_a_result_passes_through_json():
     again = from_document(Whole, document())
-    np.testing.assert_array_equal(again.values, [[1.0, np.nan], [0.1, np.nan]])
-    assert again.pair[0] == 1.0
-    assert np.isnan(again.pair[1])
-    assert (again.name, again.nature, again.texts) == ("one", Nature.ESTIMATED, ("x", "y"))
-    assert again.parts["b"].words == "text"
-    assert again.parts["a"].ends.upper.tolist() == [1.0, 1.0]
-    assert (again.share, again.further) == (None, {"z": 0.1})
     assert json.loads(as_json(to_document(again))) == document()
+    np.testing.assert_array_equal(again.values, [[1.0, np.nan], [0.1, np.nan]])
+    assert np.isnan(again.pair[1])
+    assert (again.nature, again.texts) == (Nature.ESTIMATED, ("x", "y"))
+    assert again.parts["a"].ends.upper.tolist() == [1.0, 1.0]
+    assert type(again.parts["b"]) is Other
 
 
 @pytest.mark.parametrize(

@@ -16,17 +16,6 @@ def runs(two_floors, tmp_path_factory):
     )
 
 
-def test_two_runs_stand_side_by_side(runs):
-    a, b = runs
-    head, *lines = (re.split(" {2,}", x) for x in told_by("report", a, b).splitlines())
-    rows = {line[0]: dict(zip(head, line, strict=False)) for line in lines}
-    peaks = [summary_of(x)["envelopes"]["all"]["peak"]["q2"]["upper"][0] for x in runs]
-    ratio = float(rows["greatest peak of q2"]["second over first"])
-    assert ratio == pytest.approx(peaks[1] / peaks[0], abs=1e-3)
-    assert rows["|q2| ≤ 300 mm"]["first"] == "not exceeded"
-    assert "width of the peak of drift1" in rows
-
-
 def test_more_runs_have_a_column_and_a_ratio_each(runs):
     a, b = map(str, runs)
     head, *lines = (re.split(" {2,}", x) for x in told_by("report", a, b, a, b).splitlines())

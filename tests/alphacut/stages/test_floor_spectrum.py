@@ -11,23 +11,15 @@ from alphacut.frame import FloorSpectrum, floor_spectrum
 from alphacut.frame.structures.linear import frequencies
 from alphacut.io.typed_json import from_document
 from alphacut.stages.suite import suite_records
-from tests.alphacut.case import files
-from tests.alphacut.small import summary_of, table_of, told_by
+from tests.alphacut.case.files import prepared
+from tests.alphacut.small import summary_of, told_by
 
-CASE = table_of("floor")["case"]
-RECORD = 'accelerogram = "record.csv"\n'
-
-
-def written(folder, text=CASE):
-    files.two_records(folder)
-    path = folder / "case.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
+PERIODS = 'periods = ["0 s", "0.3 s"]'
 
 
-def run(folder, text):
+def run(folder, changes):
     """The answer to a case that is run, its content, lines and title of its figure, and its text."""
-    case, out = written(folder, text), folder / "out"
+    case, out = prepared(folder, "floor", changes), folder / "out"
     told = told_by("run", case, "--out", out)
     found = from_document(FloorSpectrum, summary_of(out)["floor_spectrum"])
     with figure_style():
@@ -45,7 +37,9 @@ def by_function(content, damping=0.05, **motion):
 
 def test_a_case_has_the_answer_of_the_function_with_its_figure_and_table(tmp_path):
     """Each damping ratio has the answer that it has alone, and they share a figure."""
-    found, content, lines, _, shown = run(tmp_path, CASE + 'damping = ["2 %", "5 %"]\n')
+    found, content, lines, _, shown = run(
+        tmp_path, {PERIODS: f'{PERIODS}\ndamping = ["2 %", "5 %"]'}
+    )
     assert (found.outputs, found.damping) == (("a1", "a1"), (0.02, 0.05))
     for k, ratio in enumerate(found.damping):
         alone = by_function(content, ratio)
@@ -65,8 +59,8 @@ def test_a_case_has_the_answer_of_the_function_with_its_figure_and_table(tmp_pat
 
 
 def test_a_suite_of_records_has_mean_spectra(tmp_path):
-    text = CASE.replace(RECORD, '[records]\nfiles = ["record.csv", "other.csv"]\n')
-    found, content, lines, title, told = run(tmp_path, text)
+    records = '[records]\nfiles = ["record.csv", "other.csv"]'
+    found, content, lines, title, told = run(tmp_path, {'accelerogram = "record.csv"': records})
     assert "floor_spectrum: a1, T = 0.3 s: ≤" in told
     assert found.suite == ("record", "other")
     records = suite_records(content.records, content.envelope, content.structure)
@@ -79,8 +73,8 @@ def test_a_suite_of_records_has_mean_spectra(tmp_path):
 
 
 def test_periods_are_given_by_their_range(tmp_path):
-    text = CASE.replace('periods = ["0 s", "0.3 s"]', 'shortest = "0.1 s"\ncount = 3')
-    content = load(written(tmp_path, text)).content
+    changes = {PERIODS: 'shortest = "0.1 s"\ncount = 3'}
+    content = load(prepared(tmp_path, "floor", changes)).content
     own = 2 * np.pi / frequencies(content.structure.linear)
     own = own[(own >= 0.1) & (own <= 2.0)]
     assert len(own) > 0

@@ -34,6 +34,9 @@ limits = ["drift1 <= 11 mm"]
 random = ["zeta"]
 samples = 3
 """
+ALONE = CASE.replace('["k", "zeta"]', '["k"]').replace("[0.05, 1]", "[0.05]")
+ALONE = ALONE.replace("[4, 5, 6] %", "5 %")
+"""The learned inputs alone are fuzzy."""
 BOX = "of the box around the learned set"
 
 
@@ -76,9 +79,7 @@ def test_questions_say_of_which_box_they_are_and_claim_nothing_reached_in_it(tmp
 
 
 def test_an_envelope_of_the_learned_inputs_alone_is_that_of_the_learned_set(tmp_path):
-    text = CASE.replace('fuzzy = ["k", "zeta"]', 'fuzzy = ["k"]').replace("[0.05, 1]", "[0.05]")
-    text = text.replace("[4, 5, 6] %", "5 %")
-    summary, told, _, tables = run_with(tmp_path, text)
+    summary, told, _, tables = run_with(tmp_path, ALONE)
     peak = summary["envelopes"]["all"]["peak"]["drift1"]
     assert peak["nature"] == "guaranteed"
     assert BOX not in told
@@ -88,13 +89,11 @@ def test_an_envelope_of_the_learned_inputs_alone_is_that_of_the_learned_set(tmp_
 
 
 def test_limited_outputs_that_are_not_listed_have_the_bounds_of_the_learned_set(tmp_path):
-    text = CASE.replace('fuzzy = ["k", "zeta"]', 'fuzzy = ["k"]').replace("[0.05, 1]", "[0.05]")
-    text = text.replace("[4, 5, 6] %", "5 %")
     upper, members = [], []
     for name, outputs in (("unlisted", ["drift1"]), ("listed", ["drift1", "drift2"])):
         folder = tmp_path / name
         folder.mkdir()
-        case = text.replace('["drift1"]', str(outputs).replace("'", '"'))
+        case = ALONE.replace('["drift1"]', str(outputs).replace("'", '"'))
         case += '[decision]\nlimits = ["drift2 <= 12 mm"]\n'
         summary, told, _, tables = run_with(folder, case)
         peak = summary["envelopes"]["all"]["peak"]["drift2"]

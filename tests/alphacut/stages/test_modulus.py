@@ -13,7 +13,7 @@ from alphacut.rve.fuzzy_cell import CellSamples, FuzzyCell, require_consistent
 from alphacut.stages.cell import CellProblem, require_bounds
 from alphacut.stages.modulus import solved
 from tests.alphacut.case.test_load import fraction_case
-from tests.alphacut.small import CELL, refusals, told_by, written
+from tests.alphacut.small import CELL, told_by, written
 from tests.refused import refuses
 
 MODELS = {
@@ -87,24 +87,3 @@ def test_a_modulus_outside_the_bounds_of_the_stated_fraction_is_refused(
     for outside in ends * [0.9949, 1.0051]:
         with refuses("E of spheres"):
             require_bounds((outside, outside), bounds, "spheres")
-
-
-PACKING = """
-[microstructure]
-seed = 1
-[microstructure.packing]
-particles = 20
-fraction = 0.83
-smallest_radius = "1 mm"
-largest_radius = "2 mm"
-"""
-
-
-@pytest.mark.parametrize(("shape", "densest"), [("spheres", 0.58), ("cylinders", 0.82)])
-def test_a_packing_that_is_too_dense_names_the_cell_of_that_fraction(tmp_path, shape, densest):
-    text = fraction_case(shape, 0.3).replace("fraction = 0.3\n", "") + PACKING
-    text = text.replace('["modulus"]', '["microstructure", "modulus"]')
-    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
-    (line,) = refusals(tmp_path / "case.toml")
-    assert f"up to {densest}" in line
-    assert "set cell.fraction = 0.83" in line

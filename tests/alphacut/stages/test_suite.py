@@ -20,23 +20,17 @@ from alphacut.frame import (
 from alphacut.io.typed_json import from_document
 from alphacut.stages.suite import suite_records
 from tests.alphacut.case import files
-from tests.alphacut.small import summary_of, summary_of_run, table_of, told_by
+from tests.alphacut.case.files import prepared
+from tests.alphacut.small import summary_of, summary_of_run, told_by
 
-CASE = table_of("suite")["case"]
-QUICKER = CASE.replace("0.01 s", "0.02 s")
+QUICKER = {"0.01 s": "0.02 s"}
+YIELDING = QUICKER | {"masses": 'yield_force = ["40 kN ± 9 %"]\nmasses', '"k1"': '"fy1"'}
 PERIOD = 2 * np.pi * np.sqrt(20e3 / 8e6)
 """Natural period of the most plausible structure, in s."""
 
 
-def written(folder, text=CASE):
-    files.suite(folder)
-    path = folder / "case.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
-def records_of(folder, old="", new=""):
-    content = load(written(folder, CASE.replace(old, new))).content
+def records_of(folder, *changes):
+    content = load(prepared(folder, "suite", changes)).content
     return suite_records(content.records, content.envelope, content.structure)
 
 
@@ -45,7 +39,7 @@ def records_of(folder, old="", new=""):
     [('"PGA = 0.3 g"', "PGA", 0.3 * 9.80665), ('"Sa(T1) = 2 m/s^2"', "Sa(T1)", 2.0)],
 )
 def test_records_are_scaled_to_a_measure(tmp_path, scale, measure, value):
-    records = records_of(tmp_path, "[envelope]", f"scale = {scale}\n[envelope]")
+    records = records_of(tmp_path, ("[envelope]", f"scale = {scale}\n[envelope]"))
     for record in records:
         assert record.measures[measure] == pytest.approx(value)
         size = spectral_acceleration(record.ground, PERIOD, 0.05)
@@ -59,7 +53,7 @@ ground_type = "B"
 
 
 def test_records_are_scaled_to_a_spectrum_as_in_python(tmp_path):
-    path = written(tmp_path, QUICKER.replace("[envelope]", SPECTRUM))
+    path = prepared(tmp_path, "suite", QUICKER | {"[envelope]": SPECTRUM})
     told_by("run", path, "--quiet", "--out", tmp_path / "out")
     summary = summary_of(tmp_path / "out")
     assert "figures/spectra.svg" in summary["figures"]
@@ -81,16 +75,17 @@ def test_each_record_has_its_length_and_five_periods_unless_cut(tmp_path):
     records = records_of(tmp_path)
     free = 1.58 + 5 * PERIOD
     assert [record.duration for record in records] == pytest.approx([free] * 2, abs=0.01)
-    cut = records_of(tmp_path, 'duration = "9 s"', 'duration = "0.5 s"')
+    cut = records_of(tmp_path, ('"9 s"', '"0.5 s"'))
     assert [record.duration for record in cut] == pytest.approx([0.5] * 2)
     assert all(0.3 < record.facts.truncated_fraction < 0.95 for record in cut)
 
 
 def test_columns_without_a_head_have_step_and_unit_from_the_case(tmp_path):
-    samples = np.loadtxt(written(tmp_path).with_name("one.csv"), delimiter=",", skiprows=1)[:, 1]
+    files.suite(tmp_path)
+    samples = np.loadtxt(tmp_path / "one.csv", delimiter=",", skiprows=1)[:, 1]
     np.savetxt(tmp_path / "plain.txt", samples)
     new = '[records]\nstep = "0.02 s"\nunit = "m/s^2"\nfiles = ["plain.txt", "two.csv"]'
-    record, _ = records_of(tmp_path, '[records]\nfiles = ["one.csv", "two.csv"]', new)
+    record, _ = records_of(tmp_path, ('[records]\nfiles = ["one.csv", "two.csv"]', new))
     assert record.ground.step == 0.02
     assert record.ground.samples == pytest.approx(samples)
 
@@ -99,7 +94,7 @@ def test_what_is_unusual_in_a_record_is_a_warning(tmp_path):
     late = "".join(f"{10 + 0.02 * k:.2f},{60 * np.sin(k)}\n" for k in range(80))
     (tmp_path / "late.csv").write_text(f"time [s],acceleration [m/s^2]\n{late}")
     stated = 'step = "0.02 s"\nunit = "m/s^2"\nfiles = ["late.csv"'
-    records = records_of(tmp_path, 'files = ["one.csv"', stated)
+    records = records_of(tmp_path, ('files = ["one.csv"', stated))
     warnings = "\n".join(warning for record in records for warning in record.warnings)
     assert "of record late its times begin at 10 s" in warnings
     assert "of record late its peak is 6.12 g" in warnings
@@ -107,9 +102,8 @@ def test_what_is_unusual_in_a_record_is_a_warning(tmp_path):
 
 
 def test_the_mean_over_records_is_one_structures_and_is_shown(tmp_path):
-    path, out = written(tmp_path, QUICKER), tmp_path / "out"
-    limits = 'limits = ["mean drift1 <= 9 mm"]'
-    path.write_text(path.read_text() + f"\n[decision]\n{limits}\n", encoding="utf-8")
+    limits = '[decision]\nlimits = ["mean drift1 <= 9 mm"]\n[fragility]'
+    path, out = prepared(tmp_path, "suite", QUICKER | {"[fragility]": limits}), tmp_path / "out"
     asked = ["--set", "frame.outputs=['drift1', 'a1']"]
     told = told_by("run", path, "--out", out, *asked)
     summary = summary_of(out)
@@ -130,7 +124,7 @@ def test_the_mean_over_records_is_one_structures_and_is_shown(tmp_path):
 
 
 def test_check_shows_what_was_read_and_says_what_is_off(tmp_path):
-    path = written(tmp_path)
+    path = prepared(tmp_path, "suite")
     text = (tmp_path / "two.csv").read_text().splitlines()
     moved = [text[0], *(f"{t},{float(a) + 0.2}" for t, a in (x.split(",") for x in text[1:]))]
     (tmp_path / "two.csv").write_text("\n".join(moved) + "\n")
@@ -141,10 +135,8 @@ def test_check_shows_what_was_read_and_says_what_is_off(tmp_path):
 
 
 def test_fragility_of_columns_that_yield_has_sets_of_measures_for_each_record(tmp_path):
-    text = QUICKER.replace("masses", 'yield_force = ["[36, 40, 46] kN"]\nmasses').replace(
-        '"k1"', '"fy1"'
-    )
-    answer = from_document(Fragility, summary_of_run(written(tmp_path, text))["fragility"])
+    case = prepared(tmp_path, "suite", YIELDING | {"40 kN ± 9 %": "[36, 40, 46] kN"})
+    answer = from_document(Fragility, summary_of_run(case)["fragility"])
     limit, rows = answer.limits["drift1"], pd.DataFrame(answer.known_records(answer.crossings()))
     assert limit.nature == "estimated"
     assert [*rows["record"]] == ["one", "one", "two", "two"]
@@ -161,9 +153,8 @@ def test_fragility_of_columns_that_yield_has_sets_of_measures_for_each_record(tm
 
 
 def test_a_limit_that_no_measure_tried_exceeds_is_said_to_be_so(tmp_path):
-    text = QUICKER.replace("masses", 'yield_force = ["40 kN ± 9 %"]\nmasses').replace("k1", "fy1")
-    path = written(tmp_path, text + "most = 0.1\n")
-    answer = from_document(Fragility, summary_of_run(path)["fragility"])
+    case = prepared(tmp_path, "suite", YIELDING | {'"PGA"': '"PGA"\nmost = 0.1'})
+    answer = from_document(Fragility, summary_of_run(case)["fragility"])
     words = answer.table().rows[0][1]
     assert "mm/s^2 … no end" in words
     assert "first crossing beyond all measures tried" in words
@@ -173,11 +164,9 @@ def test_a_limit_that_no_measure_tried_exceeds_is_said_to_be_so(tmp_path):
 
 def test_curves_of_a_demand_have_their_record_and_are_drawn_once_with_all_limits(tmp_path):
     """The structure is elastic at the first measure: peaks are its drift under the record there."""
-    text = QUICKER.replace("masses", 'yield_force = ["40 kN ± 9 %"]\nmasses')
-    text = text.replace('"k1"', '"fy1"').replace(
-        '["drift1 <= 10 mm"]', '["drift1 <= 10 mm", "drift1 <= 25 mm"]'
-    )
-    answer = from_document(Fragility, summary_of_run(written(tmp_path, text))["fragility"])
+    limits = {'"drift1 <= 10 mm"': '"drift1 <= 10 mm", "drift1 <= 25 mm"'}
+    case = prepared(tmp_path, "suite", YIELDING | limits)
+    answer = from_document(Fragility, summary_of_run(case)["fragility"])
     curves = pd.DataFrame(answer.known_records(answer.curves()))
     assert set(curves["record"]) == {"one", "two"}
     assert (curves["unit"] == "m").all()
@@ -195,8 +184,9 @@ def test_curves_of_a_demand_have_their_record_and_are_drawn_once_with_all_limits
 
 
 def test_a_run_without_shares_and_questions_has_a_page(tmp_path):
-    text = QUICKER.partition("[fragility]")[0].replace("stages", "shares = false\nstages")
-    summary = summary_of_run(written(tmp_path, text))
+    question = '[fragility]\nlimits = ["drift1 <= 10 mm"]\nmeasure = "PGA"\n'
+    changes = QUICKER | {question: "", "stages": "shares = false\nstages"}
+    summary = summary_of_run(prepared(tmp_path, "suite", changes))
     assert "fingerprints" not in summary
     told_by("report", tmp_path / "out", "--quiet")
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from alphacut import main
 from alphacut.case.content import load
 from alphacut.stages.suite import suite_records
+from tests.alphacut.small import told_by
 
 CASE = """title = "An eccentric floor"
 stages = ["envelope"]
@@ -43,11 +43,9 @@ def written(folder, rng, lengths, step=0.02):
 
 
 @pytest.mark.parametrize("baseline", ["none", "mean"])
-def test_the_shorter_component_ends_in_zeros_and_it_is_said(tmp_path, capsys, rng, baseline):
+def test_the_shorter_component_ends_in_zeros_and_it_is_said(tmp_path, rng, baseline):
     case, samples = written(tmp_path, rng, (40, 60))
-    arguments = ["check", str(case), f"--set=records.baseline={baseline}"]
-    assert main(arguments) == 0
-    told = capsys.readouterr().out
+    told = told_by("check", case, f"--set=records.baseline={baseline}")
     assert "warning: of record short ends in 20 zeros, since it is shorter" in told
     content = load(str(case)).content
     section = content.records.model_copy(update={"baseline": baseline})
