@@ -130,8 +130,9 @@ def test_porous_volumes_hold_what_finite_volumes_tend_to(conductors, rng):
         if middle > coarse + 1e-9:
             limit = fine + (fine - middle) ** 2 / max(2 * middle - coarse - fine, 1e-9)
         assert coarse <= low * (1 + 1e-9) + 1e-12
-        assert low <= limit * (1 + 1e-9)
-        assert fine <= high * (1 + 1e-9)
+        # Where nothing percolates, all are 0, the reference by rounding alone.
+        assert low <= limit * (1 + 1e-9) + 1e-12
+        assert fine <= high * (1 + 1e-9) + 1e-12
 
 
 def test_bounds_beside_insulators_narrow_with_the_grid(rng):
