@@ -2,6 +2,7 @@
 
 import gc
 import os
+import signal
 import sys
 import threading
 from collections.abc import Mapping
@@ -35,8 +36,12 @@ def main(program: str = "alphacut", names: Mapping[str, str] | None = None) -> i
     # problem has flushed and closed what it wrote. Work is left only to MPI and other threads.
     is_check = sys.argv[1:2] == ["check"] and status == 0
     has_work_left = "mpi4py" in sys.modules or threading.active_count() > 1
-    if is_check and not has_work_left:
-        os._exit(status)
+    if not has_work_left:
+        if is_check:
+            os._exit(status)
+        # A signal while Python frees them would take the place of the status.
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
     return status
 
 

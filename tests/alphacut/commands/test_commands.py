@@ -185,6 +185,21 @@ def test_ctrl_c_ends_a_run_and_the_same_run_goes_on(tmp_path, capfd):
     assert "E, GPa" in capfd.readouterr().out
 
 
+ENDED = """
+import os, signal, sys
+from alphacut.__main__ import main
+sys.argv[1:] = ["keys", "no such section"]
+status = main()
+for number in (signal.SIGINT, signal.SIGTERM):
+    os.kill(os.getpid(), number)
+sys.exit(status)
+"""
+
+
+def test_a_signal_at_the_very_end_leaves_the_status():
+    assert subprocess.run([sys.executable, "-c", ENDED], capture_output=True).returncode == 2
+
+
 PROOF = ("--set", "envelope.method=auto")
 
 
