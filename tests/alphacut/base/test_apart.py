@@ -65,6 +65,7 @@ def test_arrays_and_texts_come_back_from_a_process_without_variables_of_mpi(read
         ("crashes", "Library ended by signal 11"),
         ("exhausts", "the memory that its size allows"),
         ("hangs", "Library (ended by signal|took more than)"),
+        ("waits", "Library took more than 4 s"),
     ],
 )
 def test_what_happens_to_a_reader_is_one_line(read, name, words):
