@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from functools import lru_cache
 from typing import NamedTuple
 
 _PREFIXES = {
-    "p": 1e-12, "pico~": 1e-12, "n": 1e-9, "nano~": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6,
+    "p": 1e-12, "pico~": 1e-12, "n": 1e-9, "nano~": 1e-9, "u": 1e-6, "μ": 1e-6,
     "micro~": 1e-6, "mikro~": 1e-6,
     "m": 1e-3, "milli~": 1e-3, "c": 1e-2, "centi~": 1e-2, "d": 0.1, "da": 10.0,
     "h": 1e2, "k": 1e3, "kilo~": 1e3, "M": 1e6, "mega~": 1e6, "deca~": 10.0, "G": 1e9,
@@ -26,7 +27,7 @@ _PREFIXES = {
 # prefixes that they take in brackets; * stands for the names of prefixes. Blanks within a name, and
 # behind those, are written as "~", and may be missing. Lines below replace equal names above.
 _VOCABULARY = """
-1 m m(p,n,u,µ,μ,m,c,d,k) metre(*) metres(*) meter(*) meters(*) metri métre mètre mètres metro metros
+1 m m(p,n,u,μ,m,c,d,k) metre(*) metres(*) meter(*) meters(*) metri métre mètre mètres metro metros
 .0254 m in inch inches
 .3048 m ft foot feet
 1e-10 m Å angstrom angstroms ångström
@@ -36,7 +37,7 @@ _VOCABULARY = """
 .001 m мм 毫米
 1e-6 m мкм 微米
 2.54e-5 m thou mil mils
-1 s s(n,u,µ,μ,m) second(*) seconds(*) sec(m) secs seg sek segundo segundos seconde secondes
+1 s s(n,u,μ,m) second(*) seconds(*) sec(m) secs seg sek segundo segundos seconde secondes
 1 s Sekunde Sekunden с сек 秒
 .001 s мс 毫秒
 1 cycle·s-1 Гц 赫兹
@@ -64,7 +65,7 @@ _VOCABULARY = """
 1e5 kg·m-1·s-2 bar(m)
 6894.757293168 kg·m-1·s-2 psi
 6894757.293168 kg·m-1·s-2 ksi
-9.80665 m·s-2 g(n,u,µ,μ,m) g's gs g_n gn gravity standard~gravity
+9.80665 m·s-2 g(n,u,μ,m) g's gs g_n gn gravity standard~gravity
 .00980665 m·s-2 milli~g ‰~g
 9.80665e-6 m·s-2 micro~g
 .0980665 m·s-2 %~g %~of~g %~of~gravity percent~g percent~of~g
@@ -89,13 +90,13 @@ _VOCABULARY = """
 1 rad rad(m) radian(*) radians(*)
 .017453292519943295 rad deg degree degrees °
 1 count count counts cnts digit digits bit bits lsb
-1 V V(µ,μ,m,k) volt(*) volts(*)
+1 V V(μ,m,k) volt(*) volts(*)
 1 pixel pixel pixels px pix
 1 voxel voxel voxels vox
 39.37007874015748 m-1·pixel dpi ppi
 .01 . % percent per~cent pct
 """
-_SUPERSCRIPTS = str.maketrans("⁻−¹²³⁴", "--1234")
+_SIGNS = str.maketrans("−∕⁄⋅", "-//·")
 # Units that are words or other symbols as well: they count where brackets, a number or a word such
 # as "unit" stand beside them.
 _WEAK = {*"msghtnv%мстн", "in", "us", "min", "bar", "kilo", "count", "digit", "bit", "degree"}
@@ -242,6 +243,30 @@ def _words() -> dict[str, Word | None]:
     return folded | dict.fromkeys("nvth") | words
 
 
+def folded(text: str) -> str:
+    """Return a text with signs in their plain form: "cm/s2" of "㎝/s²", and 10^-3 of 10⁻³."""
+    if text.isascii():
+        return text
+    text = re.sub(r"(?<=\d)(?=[⁻⁰¹²³⁴-⁹])", "^", text)
+    return unicodedata.normalize("NFKC", text).translate(_SIGNS)
+
+
+def decoded(content: bytes) -> str:
+    """Return the text of a content in UTF-8, else in Latin-1, its signs in their plain form."""
+    try:
+        return folded(content.decode("utf-8-sig"))
+    except UnicodeDecodeError:
+        return folded(content.decode("latin-1"))
+
+
+def has_unknown_words(text: str) -> bool:
+    """Return whether a text has words of another script, or of an encoding that is not known.
+
+    They may state whatever a number is; what of them is known here is a unit.
+    """
+    return re.search(r"[^\W\d_\x00-\u024f]{2}|[\u0080-\u024f]{4}", folded(text)) is not None
+
+
 def word_of(name: str) -> Word | None:
     """Return the meaning of a name of the vocabulary; None if there is none, or two."""
     return _words().get(name) or _words().get(name.lower())
@@ -321,7 +346,7 @@ def unit_of(text: str) -> Unit | None:
 
     Brackets, blanks and full stops around it do not matter.
     """
-    plain = text.strip(" \"'").strip("[]").strip().rstrip(".").translate(_SUPERSCRIPTS)
+    plain = folded(text).strip(" \"'").strip("[]").strip().rstrip(".")
     if plain.startswith("("):
         plain = plain.strip("() ")
     number = re.match(rf"({NUMBER})\s*[*x·]?\s*(?=[^\W\d]|%|°)", plain)
@@ -343,7 +368,7 @@ def factor_of(text: str, *dimensions: str) -> float:
 
 def mentions(text: str) -> list[Mention]:
     """Return the units in a text with the numbers beside them, from left to right."""
-    plain = text.translate(_SUPERSCRIPTS)
+    plain = folded(text)
     if not any(map(word_of, re.findall(r"[^\W\d_\u3040-\uffff]+|[\u3040-\uffff]+|[%‰°]", plain))):
         return []  # without the patterns, which take 40 ms to make
     spans = list(_spans(plain))
@@ -391,8 +416,8 @@ def mentions(text: str) -> list[Mention]:
 
 
 _NAME = re.compile(
-    r"t\s*(?:[/_(\[]\s*\(?\d*\s*(?:[nuµm]?s(?:ec)?\b|min|n\b)|,)|(?<!\d)(?<!\d\s)[a-z]\s*="
-    r"|in\s+[a-zµμ%°]",
+    r"t\s*(?:[/_(\[]\s*\(?\d*\s*(?:[nuμm]?s(?:ec)?\b|min|n\b)|,)|(?<!\d)(?<!\d\s)[a-z]\s*="
+    r"|in\s+[a-zμ%°]",
     re.IGNORECASE,
 )
 
@@ -429,7 +454,7 @@ def _numbers(text: str) -> Iterator[float]:
 
 def without_units(text: str, found: list[Mention]) -> str:
     """Return a text with blanks in place of its units and the numbers beside them."""
-    plain = text.translate(_SUPERSCRIPTS)
+    plain = folded(text)
     for one in found:
         plain = f"{plain[: one.start]}{' ' * (one.end - one.start)}{plain[one.end :]}"
     return plain

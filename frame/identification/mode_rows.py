@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
@@ -19,6 +20,7 @@ from alphacut.base.units import (
     TRANSFORMED,
     Mention,
     factor_of,
+    has_unknown_words,
     mentions,
     unit_of,
     without_units,
@@ -50,8 +52,8 @@ class ModeRows:
 
 # Words of numbers that are no frequencies in a unit, but periods, angular ones or quotients.
 _OTHER_NUMBERS = (
-    r"(?i)\b(?:periods?|omega\w*|angular|circular|pulsations?|eigenvalues?|lambda|2\s*[x×*·]?\s*pi"
-    r"|ratios?|relative|reduced|per\s?cent|db|decibels?|half|perioden?)\b|\b1\s*/\s*f|ω|2\s*[x×*·]?\s*π|^T\b|\bf\w?\s*/\s*f"
+    r"(?i)\b(?:omega\w*|angular|circular|pulsations?|eigenvalues?|lambda|2\s*[x×*·]?\s*pi"
+    r"|ratios?|relative|reduced|per\s?cent|db|decibels?|half)\b|p[eé]r[ií]od(?!og|ic)|dauer\b|\b1\s*/\s*f|ω|2\s*[x×*·]?\s*π|^T\b|\bf\w?\s*/\s*f"
     rf"|{FACTOR}|{TRANSFORMED}|\bper\s+minute|\b(?:kreis|winkel)frequen"
 )
 _RELATIVE = (
@@ -172,8 +174,11 @@ def unit_of_frequencies(
     unsure: list[Stated] = []
     for place, text in texts.items():
         if not override:
-            for one in mentions(text):
+            found = mentions(text)
+            for one in found:
                 _add_unit(one, place, name, own, unsure)
+            if has_unknown_words(without_units(text, found)):
+                unsure.append(Stated(math.nan, text[:60], place))
     said = Stated(_hertz_of("frequency_unit", unit), unit) if unit else None
     return settled(name, "frequency_unit", own, said, override=override, unsure=unsure)
 

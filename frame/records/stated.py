@@ -16,6 +16,7 @@ from alphacut.base.units import (
     TRANSFORMED,
     Mention,
     factor_of,
+    has_unknown_words,
     mentions,
     without_units,
 )
@@ -29,7 +30,7 @@ _SENSOR = (
 )
 _SITE = r"(?i)altitude|height|elevation|depth|coordinate|vs_?30|\bwave|peak|pg[vd]|distance"
 FACTOR = (
-    r"(?:[x×*·]\s*|\b)10\s*(?:\^|\*\*|⁻|[²³⁴⁵⁶])|[x×*·]\s*10\s*[-−]\s*\d|\b1\.?0*e[-+]?\d"
+    r"(?:[x×*·]\s*|\b)10\s*(?:\^|\*\*)|[x×*·]\s*10\s*-\s*\d|\b1\.?0*e[-+]?\d"
     r"|(?<![a-z_])[x×*·]\s*(?:1000*\b|0?\.\d)"
     r"|\b(?:scal\w*[\s_]*factor|scal\w*(?=\s*[:=])|(?:multipl\w*|divide\w*)(?:\s+[a-z]+){0,6}|conversion)[\s:=]*"
     r"(?!1(?:\.0*)?\b)[\d.]|\btimes\s+(?:\d|t\w+)|\bfactor\s*(?:of\s+)?[:=]?\s*(?!1\b)\d|(?<=[a-z])\s*/\s*10+\b"
@@ -159,7 +160,10 @@ class TextStatements:
                 self.steps.append(_step(number, shown, place, is_rate=is_rate))
             rest = bare.sub(" ", rest)
         # In words of a language that is not known here, a number may be the step or the rate.
-        is_sampling = re.search(_SAMPLING, text) is not None
+        is_unknown = has_unknown_words(rest)
+        if is_unknown:
+            self.unsure_units.append(Stated(nan, text.strip()[:60], place))
+        is_sampling = is_unknown or re.search(_SAMPLING, text) is not None
         for match in _LONE_NUMBER.finditer(_COUNT.sub(" ", rest)):
             number = float(match[0].replace(",", ".")) or nan
             stated = Stated(number if number < MAX_STEP else 1 / number, text.strip()[:60], place)

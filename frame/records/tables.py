@@ -105,7 +105,7 @@ class _Table:
         """
         lines = [k for k, text in enumerate(file.lines) if text.strip()]
         plain = [k for k in lines if not re.match(_COMMENT, file.lines[k])]
-        is_row = re.compile(r'[\s"]*[-+−]?[.,]?\d').match
+        is_row = re.compile(r'[\s"]*[-+]?[.,]?\d').match
         first = next((k for k in plain if is_row(file.lines[k])), len(file.lines))
         rows = {k: file.lines[k] for k in plain if k >= first}
         texts = tuple(k for k in lines if k not in rows)

@@ -16,7 +16,7 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, printable, require
 from alphacut.base.memory import require_text
-from alphacut.base.units import ACCELERATION, unit_of
+from alphacut.base.units import ACCELERATION, decoded, unit_of
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak, remarks_on_peak
 
@@ -322,14 +322,6 @@ def choose_channel(location: str, channel: str, names: Sequence[tuple[str, ...]]
     value = f"channel {channel or 'not named'}"
     require(len(chosen) == 1, location, value, f"one of: {allowed or 'accelerations'}")
     return chosen[0]
-
-
-def decoded(content: bytes) -> str:
-    """Return the text of a content in UTF-8, else in Latin-1."""
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return content.decode("latin-1")
 
 
 def read_bytes(path: Path) -> bytes:

@@ -17,10 +17,10 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
-from alphacut.base.units import factor_of
+from alphacut.base.units import decoded, factor_of
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated import named_quantity
-from alphacut.frame.records.text_file import NUMBER, choose_channel, decoded, recording_in_si
+from alphacut.frame.records.text_file import NUMBER, choose_channel, recording_in_si
 
 # Codes of the type of values: complex single and complex double.
 COMPLEX = (5, 6)

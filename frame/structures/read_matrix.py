@@ -22,9 +22,17 @@ from alphacut.base.csv_columns import NUMBER
 from alphacut.base.errors import RefusedError, path_of, printable, require
 from alphacut.base.memory import require_free_memory, require_text
 from alphacut.base.stated import Stated, require_overrides, settled, warn_of_overrides
-from alphacut.base.units import FREQUENCY, TRANSFORMED, Mention, mentions, without_units, word_of
+from alphacut.base.units import (
+    FREQUENCY,
+    TRANSFORMED,
+    Mention,
+    decoded,
+    has_unknown_words,
+    mentions,
+    without_units,
+    word_of,
+)
 from alphacut.frame.records.stated import FACTOR
-from alphacut.frame.records.text_file import decoded
 from alphacut.frame.structures.entry_lists import (
     NamedMatrix,
     chosen_place,
@@ -51,6 +59,7 @@ _QUANTITIES = {
     "kg m2 rad-1 s-2": "stiffness", "kg s-1": "damping", "kg m2 s-1": "damping",
     "kg m2 rad-1 s-1": "damping", "kg m s-1": "damping",
 }  # fmt: skip
+_NAMES = {"mass": "mass|trägheit", "stiffness": "stiff|steif|rigid", "damping": "damp|dämpf|amort"}
 # What stands before the unit of all entries, where that has a number.
 _IN_UNITS = r"(?i)\b(?:in|units?(?:\s+of)?)\W*$|[\[(]\s*$|^\W*$"
 # Words of numbers that are no entries in units of SI, whatever units stand beside them.
@@ -132,7 +141,7 @@ def _texts_in(path: Path, member: str) -> Iterator[tuple[str, str]]:
         for name in names_in_npz(path):
             if member in ("", name):
                 yield name.replace("_", " "), "in the name of its array"
-            if "unit" in name.lower():
+            if re.search("(?i)unit|meta|info|desc|comment|note|attr", name):
                 yield f"unit {read_npz(path, name, kinds='SU')}", f"array {name}"
     if suffix in (".npz", ".npy", ".op4", ".full"):
         return
@@ -155,6 +164,7 @@ def _stated_factor(path: Path, member: str, quantity: str) -> float:
             numbers.
     """
     stated: list[Stated] = []
+    named: set[str] = set()
     kinds = {".sti": {"stiffness"}, ".mas": {"mass"}}.get(path.suffix.lower(), set())
     unsure: list[Stated] = []
     cure = "write the matrix in N, m, kg, or say override = ['unit'] if the comment is wrong"
@@ -166,11 +176,12 @@ def _stated_factor(path: Path, member: str, quantity: str) -> float:
         are_multiplied = r"(?i)\b(?:multipl\w*|divide\w*|factor|times)\b[^,;]*$"
         has_factor = any(one.numbers and re.search(are_multiplied, one.before) for one in units)
         rest = without_units(line, units)
+        named |= {kind for kind, words in _NAMES.items() if re.search(words, rest, re.IGNORECASE)}
         # "mass = weight / g" is a mass.
         is_mass = re.search(r"(?i)\bmass\w*\s*=", line) is not None
         is_other = re.search(_OTHER_NUMBERS, rest) is not None and not is_mass
         # Of a unit in a script that is not known nothing would be seen.
-        is_other |= not units and re.search("[\u0370-\uffff]{2}", rest) is not None
+        is_other |= not units and has_unknown_words(rest)
         is_other |= any(x.dimension == "" and x.is_sure and not x.numbers for x in units)
         allowed = "entries of stiffness, damping or mass in units"
         require(is_name or not is_other, place, line.strip()[:60], allowed, cure)
@@ -192,12 +203,16 @@ def _stated_factor(path: Path, member: str, quantity: str) -> float:
             if factor:
                 where = unsure if one.is_multiple or not one.is_sure else stated
                 where.append(Stated(factor, one.shown, where_it_stands))
-                kinds |= {_QUANTITIES.get(one.dimension, "")} if where is stated else set()
+                # A force alone in brackets is the unit of each number, and of no matrix.
+                is_force = one.behind.startswith(("]", ")"))
+                kind = _QUANTITIES.get(one.dimension, "force" if is_force else "")
+                kinds |= {kind} if where is stated else set()
     found = settled(path.name, "unit", stated)
+    kinds = kinds or (named if len(named) == 1 else kinds)
     # A unit of forces alone, or beside one of masses, is one of a system of units.
     is_system = kinds <= {"", "mass"} and kinds != {"mass"}
     is_asked = not quantity or quantity in kinds or is_system
-    what = f"of {' and '.join(sorted(kinds))}, by {found or 'its ending'}"
+    what = f"of {' and '.join(sorted(kinds))}, by {found or 'its words or ending'}"
     require(is_asked, path.name, what, f"of {quantity}", "name the file of that quantity")
     taken = found or Stated(1.0, "of SI")
     for doubtful in unsure:

@@ -220,7 +220,8 @@ def _read_picture(path: Path, sides: Sequence[float], override: Collection[str])
         found = _spacing_of(path, picture)
         texts = [text for text in picture.info.values() if isinstance(text, str)]
         found = found._replace(texts=[*texts, *found.texts])
-        require_spacing(path.name, found, sides, override=override)
+        size = (picture.width, picture.height)
+        require_spacing(path.name, found, sides, counts=size, override=override)
         require_memory((picture.height, picture.width))
         if is_colour:
             return _grey_of_colours(path.name, np.asarray(picture.convert("RGBA")))

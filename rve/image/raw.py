@@ -15,6 +15,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError, require
+from alphacut.base.units import decoded
 from alphacut.rve.image.spacing import StatedSpacing, require_spacing, unit_in_texts
 
 HEADS = (".mhd", ".mha", ".nhdr", ".nrrd")
@@ -276,7 +277,7 @@ class _Entries:
         lines = start.splitlines(keepends=True)
         for row, line in enumerate(lines, 1):
             size += len(line)
-            key, *value = re.split(r":=|[=:]", _decoded(line).strip(), maxsplit=1)
+            key, *value = re.split(r":=|[=:]", decoded(line).strip(), maxsplit=1)
             text = "".join(value).strip()
             name = key.strip().lower()
             if name.startswith(("#", "comment")) and name in values:
@@ -293,14 +294,6 @@ class _Entries:
     def value(self, *keys: str) -> str:
         """Return the value of the first of some keys that is there; empty where none is."""
         return next((self.values[key] for key in keys if key in self.values), "")
-
-
-def _decoded(line: bytes) -> str:
-    """Return a line as UTF-8, or as Latin-1 where it is none."""
-    try:
-        return line.decode("utf-8")
-    except UnicodeDecodeError:
-        return line.decode("latin-1")
 
 
 def _skipped(name: str, entries: _Entries, *, is_packed: bool) -> int:

@@ -9,7 +9,16 @@ from typing import NamedTuple
 
 from alphacut.base.errors import require
 from alphacut.base.stated import LENGTHS, Stated, settled
-from alphacut.base.units import NUMBER, Mention, factor_of, mentions, without_units
+from alphacut.base.units import (
+    NUMBER,
+    Mention,
+    decoded,
+    factor_of,
+    folded,
+    has_unknown_words,
+    mentions,
+    without_units,
+)
 
 VOLUME = 3
 # Words of sides of voxels, of sides along z, of pixels, which lie in a slice, of whole volumes, and
@@ -27,7 +36,7 @@ _OTHERS = (
 )
 _AXIS = r"(?i)(?:(?:^|[\W_])[dvΔδ]?|\bd)([xyz]{1,3})[\"']?\s*[:=]*\s*$"
 # A number of one axis without a unit.
-_BARE_AXIS = rf"(?i)\bd?([xyz])[\"']?\s*[:=]\s*({NUMBER})(?!\s*[a-zµμ])"
+_BARE_AXIS = rf"(?i)\bd?([xyz])[\"']?\s*[:=]\s*({NUMBER})(?!\s*[a-zμ])"
 
 
 class StatedSpacing(NamedTuple):
@@ -80,7 +89,8 @@ def require_spacing(
     require(are_lengths, name, shown, "spacings greater than 0, or none")
     # Without a known unit the ratios of the sides count: of all axes in the unit of the first one.
     factors = [factor_of(unit, "m") or math.nan for unit in units]
-    if all(math.isnan(factors[k]) for k in known):
+    has_units = not all(math.isnan(factors[k]) for k in known)
+    if not has_units:
         is_one = len({units[k] for k in known}) < 2
         require(is_one, name, shown, f"units {LENGTHS}")
         scales = [expected[k] / stated[k] for k in known] or [1.0]
@@ -91,7 +101,7 @@ def require_spacing(
     values = dict(enumerate(expected))
     if len(expected) == VOLUME:
         values[VOLUME] = math.prod(expected)
-    lengths = [one for text in found.texts for one in _lengths_in(text, counts)]
+    lengths = [one for text in found.texts for one in _lengths_in(folded(text), counts)]
     has_depth = any(one.axes == (2,) for one in lengths)
     for one in lengths:
         # Beside the distance of slices the side of a voxel is that within a slice.
@@ -102,7 +112,7 @@ def require_spacing(
             place = "m^3" if axis == VOLUME else f"m along {'xyz'[axis]}"
             said = Stated(values[axis], f"of {values[axis]:g} {place}")
             settled(name, "voxel", [one.stated], said, tolerance=0.03 if axis == VOLUME else 0.01)
-    if known or not lengths or any(one.axes for one in lengths):
+    if has_units or not lengths or any(one.axes for one in lengths):
         return
     # Lengths of which no word says what they are must be those of the case, or of the volume.
     extents = [side * count for side, count in zip(expected, counts, strict=False)]
@@ -149,6 +159,8 @@ def _lengths_in(text: str, counts: Sequence[int]) -> Iterator[_Length]:
             groups[-1].append(one)
         elif one.numbers:
             groups.append([one])
+    if not groups and has_unknown_words(text) and re.search(r"\d", text):
+        yield _Length((), Stated(math.nan, text.strip()[:60]))
     for group in groups:
         first = group[0]
         if first.dimension in ("m-1 pixel", "m-1 voxel", "m pixel-1", "m voxel-1"):
@@ -160,6 +172,13 @@ def _lengths_in(text: str, counts: Sequence[int]) -> Iterator[_Length]:
         elif first.dimension == "m" or (first.dimension == "m3" and len(first.numbers) == 3):
             scale = first.unit.factor ** (1 if first.dimension == "m" else 1 / 3)
             lengths = [scale * number for one in group for number in one.numbers]
+            # Of the bar of a scale, as "50 um = 10 px".
+            pixels = re.search(rf"({NUMBER})\s*pi?x\w*\s*=\s*$", text[: first.start])
+            pixels = pixels or re.match(rf"\s*=\s*({NUMBER})\s*pi?x", text[group[-1].end :])
+            if pixels and len(lengths) == 1:
+                length = lengths[0] / (float(pixels[1]) or math.nan)
+                yield _Length((0, 1), Stated(length, f"{first.shown} of {pixels[1]} pixels"))
+                continue
             yield from _sides_of(first.before, group[-1].behind, lengths, counts, first.shown)
 
 
@@ -199,7 +218,7 @@ def _sides_of(
 
 def unit_in_texts(texts: Iterable[str]) -> str:
     """Return the unit of all lengths that lines state, as "lengths in um"; empty if none does."""
-    announced = re.compile(r"(?i)\bin\W*$|unit|^\W*(?:comment)?\W*$")
+    announced = re.compile(r"(?i)\bin\W*$|unit|[\[(]$|^\W*(?:comment)?\W*$")
     for text in texts:
         for one in mentions(text):
             if one.dimension == "m" and not one.numbers and announced.search(one.before):
@@ -230,11 +249,12 @@ def spacing_of_tags(tags: Mapping[int, object]) -> StatedSpacing:
     Args:
         tags: Values of the tags by their numbers.
     """
-    description = str(tags.get(270, ""))
-    texts = [str(tags.get(code, "")) for code in (305, 315)]  # of the program and the author
+    words = {code: _plain(text) for code, text in tags.items() if isinstance(text, str)}
+    description = words.pop(270, "")
+    texts = list(words.values())
     # Lists of settings of Zeiss and FEI, whose lengths without a unit are in m.
-    settings = "\n".join(str(tags.get(code, "")) for code in (34118, 34680, 34682))
-    size = rf"(?i)pixel ?(?:size|(width)|height)[^\w.\n]+({NUMBER})[ ',]*([a-zµ]*)"
+    settings = folded("\n".join(str(tags.get(code, "")) for code in (34118, 34680, 34682)))
+    size = rf"(?i)pixel ?(?:size|(width)|height)[^\w.\n]+({NUMBER})[ ',]*([a-zμ]*)"
     for match in re.finditer(size, settings):
         unit = match[3] if factor_of(match[3], "m") else "m"
         axis = "x = " if match[1] else ""
@@ -259,6 +279,14 @@ def spacing_of_tags(tags: Mapping[int, object]) -> StatedSpacing:
         return StatedSpacing([x, y], ["cm", "cm"], texts)
     found = spacing_of_resolution(1 / x, 1 / y) if unit == "2" else StatedSpacing([x, y], ["", ""])
     return found._replace(texts=texts)
+
+
+def _plain(text: str) -> str:
+    """Return a text of a tag, which Pillow takes as Latin-1 and programs write in UTF-8, too."""
+    try:
+        return decoded(text.encode("latin-1"))
+    except UnicodeEncodeError:
+        return folded(text)
 
 
 def _ome_spacing(head: str) -> StatedSpacing:

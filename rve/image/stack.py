@@ -106,7 +106,9 @@ def _read_file(
     require(n_bytes <= max_bytes, name, what, f"what {file_size} bytes can hold")
     found = spacing_of_tags({int(tag.code): tag.value for tag in file.pages.first.tags})
     texts = [*found.texts, str((file.imagej_metadata or {}).get("Info", ""))]
-    require_spacing(name, found._replace(texts=texts), sides, override=override)
+    counts = [n for n in reversed(spatial) if n > 1]
+    found = found._replace(texts=texts)
+    require_spacing(name, found, sides, counts=counts, override=override)
 
     if compression == 5:  # LZW, which tifffile does not unpack without another package
         values = _pages_by_pillow(path, first.dtype)

@@ -56,6 +56,8 @@ def test_what_is_no_unit_or_two_is_none(text):
         ("t (ms), a", [("ms", (), True)]),
         ("sensitivity 1.25 V/(m/s^2)", [("V/(m/s^2)", (1.25,), True)]),
         ("12 samples in a row", []),
+        ("㎝/s², １００㎐", [("cm/s2", (), True), ("Hz", (100,), True)]),
+        ("単位：ｇａｌ", [("gal", (), True)]),
     ],
 )
 def test_units_in_texts_are_found_with_their_numbers(text, expected):

@@ -148,6 +148,8 @@ def test_other_arguments_are_refused(tmp_path, name, options, key):
         ("# tenths of Hz\nmode,frequency,q1,q2", "", None),
         ("# percent of 10 Hz\nmode,frequency,q1,q2", "Hz", None),
         ("# first at 1.5 Hz\nmode,frequency,q1,q2", "kHz", None),
+        ("# Eigenperioden\nmode,frequency,q1,q2", "Hz", None),
+        ("# Schwingungsdauer\nmode,frequency,q1,q2", "Hz", None),
     ],
 )
 def test_the_unit_of_frequencies_is_stated_or_asked_for(tmp_path, head, unit, factor):
@@ -166,10 +168,16 @@ def test_decimal_commas_beside_semicolons_and_units_beside_signs_are_read(tmp_pa
     assert [x.frequency.nominal for x in read_modes(written(tmp_path, text))] == [1.5, 4]
     text = "# 频率的单位是kHz\nmode,frequency,q1,q2\n1,1.5,0.5,1\n"
     path = tmp_path / "modes.csv"
-    path.write_text(text, encoding="utf-8")
-    assert read_modes(path)[0].frequency.nominal == 1500
-    with pytest.raises(RefusedError, match="frequency_unit Hz"):
-        read_modes(path, frequency_unit="Hz")
+    for unit in ("kHz", "ｋＨｚ", "㎑"):
+        path.write_text(text.replace("kHz", unit), encoding="utf-8")
+        assert read_modes(path)[0].frequency.nominal == 1500
+        with pytest.raises(RefusedError, match="frequency_unit Hz"):
+            read_modes(path, frequency_unit="Hz")
+    # A unit that is not known may be any.
+    path.write_text(text.replace("kHz", "千赫"), encoding="utf-8")
+    for unit in ("Hz", "kHz"):
+        with pytest.raises(RefusedError, match="override"):
+            read_modes(path, frequency_unit=unit)
 
 
 def test_the_cure_of_periods_is_their_reciprocal(tmp_path):

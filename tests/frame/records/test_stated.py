@@ -320,6 +320,18 @@ def test_a_number_in_words_of_other_languages_is_named_and_compared(tmp_path, li
         assert read_record(path, step=step, override=["step"]).step == step
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1251"])
+def test_words_of_another_script_are_held_for_the_unit_and_the_step(tmp_path, encoding):
+    path = saved(tmp_path, "", COLUMN)
+    column = path.read_text()
+    path.write_bytes(f"Ускорение в миллиграммах, такт 0.02\n{column}".encode(encoding))
+    with pytest.raises(RefusedError, match=r'override = \["step"\]'):
+        read_record(path, unit="g", step=0.01)
+    with pytest.raises(RefusedError, match=r'override = \["unit"\]'):
+        read_record(path, unit="g", step=0.02)
+    assert read_record(path, unit="g", step=0.02, override=["unit"]).step == 0.02
+
+
 def test_a_unit_that_is_said_is_compared_with_a_letter_that_may_be_one(tmp_path):
     path = saved(tmp_path, "station x, g\ndt = 0.01 s\n", COLUMN)
     with pytest.raises(RefusedError, match=r"say records\.unit"):

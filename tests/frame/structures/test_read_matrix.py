@@ -301,6 +301,9 @@ def test_units_tell_the_quantity_and_names_of_files_state_none(tmp_path):
     np.savez(tmp_path / "n.npz", k=matrix, unit="MN/m")
     (tmp_path / "k.csv").write_text("# damping, kN s/m\n2,-1\n-1,2\n")
     (tmp_path / "s.csv").write_text("# units: kN, m, t\n2,-1\n-1,2\n")
+    (tmp_path / "w.csv").write_text("# W [kN]\n2,-1\n-1,2\n")
+    (tmp_path / "c.csv").write_text("# lumped mass matrix\n2,-1\n-1,2\n")
+    np.savez(tmp_path / "p.npz", k=matrix, meta='{"units": "kN/m"}')
     cases = {
         "K_kN_per_m.npy": (1, {"mass", "stiffness", "damping"}),
         "frame MN.csv": (1e3, {"stiffness"}),
@@ -308,9 +311,12 @@ def test_units_tell_the_quantity_and_names_of_files_state_none(tmp_path):
         "n.npz": (1e6, {"stiffness"}),
         "k.csv": (1e3, {"damping"}),
         "s.csv": (1e3, {"mass", "stiffness", "damping"}),
+        "w.csv": (1e3, set()),
+        "c.csv": (1, {"mass"}),
+        "p.npz": (1e3, {"stiffness"}),
     }
     for name, (factor, quantities) in cases.items():
-        member = "k" if name == "n.npz" else ""
+        member = "k" if name in ("n.npz", "p.npz") else ""
         for quantity in ("mass", "stiffness", "damping"):
             if quantity in quantities:
                 array = read_matrix(tmp_path / name, name=member, quantity=quantity)

@@ -475,6 +475,8 @@ def test_units_of_single_axes_are_compared_and_may_be_overridden(tmp_path, rng):
         ("nrrd", "# xy 2 um z 5 um", (2, 2, 5)),
         ("nrrd", "spacings: 2e-3 2e-3 5e-3\n# mm", (2, 2, 5)),
         ("nrrd", "# 2 µm in the plane\n# 5 µm across", (2, 2, 5)),
+        ("nrrd", 'spacings: 2 2 5\nlabels: "x [um]" "y [um]" "z [um]"', (2, 2, 5)),
+        ("nrrd", "spacings: 1 1 2.5\n# 2 µm, 5 µm", (2, 2, 5)),
         ("nrrd", "# extent: 14 x 10 x 60 micrometres", (2, 2, 5)),
         ("mhd", "Comment = field of view 14 um x 10 um x 60 um", (2, 2, 5)),
         ("nrrd", "spacings: 20000 20000 50000\n# unit: Å", (2, 2, 5)),
@@ -578,6 +580,9 @@ STATED = {
     "zeiss.tif": 12.5 * NM,
     "fei.tif": 12.5 * NM,
     "artist.tif": 3e-6,
+    "bar.tif": 5e-6,
+    "view.tif": 5e-6,
+    "russian.tif": 5e-6,
     "scale.png": 7e-6,
 }
 """Side of a pixel that each picture below states, in m."""
@@ -593,6 +598,9 @@ def write_picture(path, page):
         "zeiss.tif": {**grey, "extratags": [(34118, 2, len(ZEISS), ZEISS, True)]},
         "fei.tif": {**grey, "extratags": [(34682, 2, len(FEI), FEI, True)]},
         "artist.tif": {**grey, "extratags": [(315, 2, 16, "pixel size 3 um", True)]},
+        "bar.tif": {**grey, "description": "scale bar 50 um = 10 px"},
+        "view.tif": {**grey, "description": "field of view 40 um x 40 um"},
+        "russian.tif": {**grey, "extratags": [(270, 2, 0, "пиксель 5 мкм".encode(), True)]},
     }
     if path.suffix == ".tif":
         tifffile.imwrite(path, page, **options[path.name])
