@@ -167,31 +167,6 @@ def peak_over_limit(limit: LimitDecision) -> Ends:
     return Ends(lower, upper)
 
 
-def draw_bands(axes: Axes, x: Array, bands: Ends, alpha: Array, *, in_steps: bool = False) -> None:
-    """Draw lower and upper bounds of a probability over x, on each α-level.
-
-    Args:
-        axes: Axes that are drawn on.
-        x: Rising values, shape (X,).
-        bands: Bounds, shape (A, X) each. Those of the highest level are drawn as lines.
-        alpha: Rising levels, shape (A,).
-        in_steps: Whether the probability jumps at each value x and is constant up to the next.
-    """
-    band: Look = {"lw": 0}
-    line: Look = {"color": INK, "lw": 1}
-    if in_steps:
-        band["step"] = "post"
-        line["drawstyle"] = "steps-post"
-    # Cuts are nested, so that higher levels are drawn over lower ones. On the highest level crisp
-    # inputs leave a band of no width: it is drawn as lines.
-    levels = zip(bands.lower[:-1], bands.upper[:-1], style.colours(alpha)[:-1], strict=True)
-    for low, high, shade in levels:
-        axes.fill_between(x, low, high, color=shade, **band)
-    for end in (bands.lower[-1], bands.upper[-1]):
-        axes.plot(x, end, **line)
-    axes.set_ylim(0, 1.02)
-
-
 def draw_probability(answer: Probability) -> Figure:
     """Draw bounds of the probability of exceeding a limit, over the limit, on each α-level.
 
@@ -210,7 +185,8 @@ def draw_probability(answer: Probability) -> Figure:
     if is_near:
         place = "dashed"
     figure, axes = plt.subplots()
-    draw_bands(axes, limits, Ends(event.curve.lower, event.curve.upper), answer.alpha)
+    curve = Ends(event.curve.lower, event.curve.upper)
+    style.draw_bands(axes, limits, curve, answer.alpha)
     style.alpha_legend(axes, answer.alpha)
     limit_text = event.value_words
     label = f"limit of |{event.output}|"
@@ -220,7 +196,7 @@ def draw_probability(answer: Probability) -> Figure:
     axes.set_title(f"limit {limit_text} ({place})".replace("^2", "²"))
     if is_near:
         axes.axvline(event.limit, **LIMIT)
-    axes.set_ylabel("probability of exceeding it")
+    axes.set(ylabel="probability of exceeding it", ylim=(0, 1.02))
     style.prefix_axis(axes, label, event.unit, across=True, shown=event.stated_unit)
     return figure
 
@@ -252,7 +228,8 @@ def draw_fragility_of(axes: Axes, answer: Fragility, part: LimitFragility) -> No
         part: Bounds of the fraction of records on each level, and the limits of 95 % confidence,
             which are drawn dashed for the lowest level if there are some.
     """
-    draw_bands(axes, part.measure, part.band, answer.alpha, in_steps=True)
+    style.draw_bands(axes, part.measure, part.band, answer.alpha, in_steps=True)
+    axes.set_ylim(0, 1.02)
     for curve in part.lognormal_fit(-1):  # one or two curves, of the ends on the highest level
         axes.plot(part.measure, curve, **FIT)
     if part.confidence is not None:

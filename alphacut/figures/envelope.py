@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from alphacut.base.arrays import Array
 from alphacut.base.number_text import ShownUnit
 from alphacut.figures import style
-from alphacut.figures.style import GREY, INK
+from alphacut.figures.style import GREY
 from alphacut.frame.analyses.peaks import Peak
 from alphacut.frame.structures.quantities import Output
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.result import Ends, Nature
 from alphacut.stages.envelope import EnvelopeTask
 
 
@@ -41,15 +41,8 @@ def envelope(
     shown = dataset.sel(output=str(output))
     alpha = dataset["alpha"].values
     time = dataset["time"].values
-    for level, shade in enumerate(style.colours(alpha)[:-1]):
-        band = shown.isel(alpha=level)
-        axes.fill_between(time, band["lower"], band["upper"], color=shade, lw=0)
-    # The highest level has no area where the inputs are crisp there: it is drawn as lines. A thin
-    # line around the lowest level keeps pale bands visible in print.
-    for side in ("lower", "upper"):
-        axes.plot(time, shown.isel(alpha=-1)[side], color=INK, lw=0.8)
-        axes.plot(time, shown.isel(alpha=0)[side], color=INK, lw=0.3)
-
+    lower, upper = (shown[side].transpose("alpha", "time").values for side in ("lower", "upper"))
+    style.draw_bands(axes, time, Ends(lower, upper), alpha, is_outlined=True)
     nature = Nature(dataset.attrs["nature"])
     error = ""
     # Guaranteed bounds contain their error, and the error of attained bounds is not known.

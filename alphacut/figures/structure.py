@@ -19,6 +19,7 @@ from alphacut.frame import Peak, StoreyFrame
 from alphacut.frame.analyses.storey_table import storey_table
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.quantities import Output
+from alphacut.fuzzy.result import Ends
 
 PANEL_HEIGHT = 4.2
 """Height of a figure over the storeys, in inches."""
@@ -78,13 +79,10 @@ def profiles(peaks: Mapping[str, Peak], units: Mapping[str, ShownUnit]) -> Figur
         alpha = of_levels[0].alpha
         # Values are in the unit shown, so that the ticks of g are round numbers.
         unit = units[levels[0].name]
-        lower = unit.factor * np.array([peak.lower for peak in of_levels])  # (storeys, levels of α)
-        upper = unit.factor * np.array([peak.upper for peak in of_levels])
-        for row, shade in enumerate(style.colours(alpha)[:-1]):
-            axes.fill_betweenx(numbers, lower[:, row], upper[:, row], color=shade, lw=0)
-        for ends in (lower, upper):
-            axes.plot(ends[:, -1], numbers, color=INK, lw=1)
-            axes.plot(ends[:, 0], numbers, color=INK, lw=0.3)
+        lower = unit.factor * np.array([peak.lower for peak in of_levels]).T  # (levels, storeys)
+        upper = unit.factor * np.array([peak.upper for peak in of_levels]).T
+        bands = Ends(lower, upper)
+        style.draw_bands(axes, np.array(numbers), bands, alpha, is_outlined=True, is_upright=True)
         attained = [unit.factor * peak.reached[0] for peak in of_levels]
         axes.plot(attained, numbers, ls="", marker="o", ms=3.5, color=ORANGE)
         axes.set_yticks(numbers)

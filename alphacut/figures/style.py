@@ -20,6 +20,7 @@ from matplotlib.patches import Patch
 
 from alphacut.base.arrays import Array
 from alphacut.base.number_text import MINUS, ShownUnit, axis_prefix
+from alphacut.fuzzy.result import Ends
 
 # Colours of Okabe and Ito, which colour-blind readers tell apart; purple differs from blue and
 # orange in lightness as well.
@@ -106,6 +107,40 @@ def colours(alpha: Array) -> list[Colour]:
     """Return a colour for each α-level: the higher the darker, distinct in grey print as well."""
     # The ends of the colour map are left out: one is as light as paper, one as dark as lines.
     return [colormaps["YlGnBu"](0.25 + 0.65 * float(level)) for level in alpha]
+
+
+def draw_bands(
+    axes: Axes,
+    x: Array,
+    bands: Ends,
+    alpha: Array,
+    *,
+    in_steps: bool = False,
+    is_outlined: bool = False,
+    is_upright: bool = False,
+) -> None:
+    """Fill the band between lower and upper bounds over x, on each α-level.
+
+    Args:
+        axes: Axes that are drawn on.
+        x: Rising values, shape (X,).
+        bands: Bounds, shape (A, X) each.
+        alpha: Rising levels, shape (A,).
+        in_steps: Whether the bounds jump at each value x and are constant up to the next.
+        is_outlined: Whether a thin line around the lowest level keeps pale bands visible in print.
+        is_upright: Whether x stands on the vertical axis.
+    """
+    fill = axes.fill_betweenx if is_upright else axes.fill_between
+    # Cuts are nested, so that higher levels are drawn over lower ones.
+    levels = zip(bands.lower[:-1], bands.upper[:-1], colours(alpha), strict=False)
+    for low, high, shade in levels:
+        fill(x, low, high, color=shade, lw=0, step="post" if in_steps else None)
+    # On the highest level crisp inputs leave a band of no width: it is drawn as lines.
+    widths = {-1: 1.0, 0: 0.3} if is_outlined else {-1: 1.0}
+    for level, width in widths.items():
+        for end in bands:
+            across, up = (end[level], x) if is_upright else (x, end[level])
+            axes.plot(across, up, color=INK, lw=width, ds="steps-post" if in_steps else "default")
 
 
 def alpha_legend(axes: Axes, alpha: Array, further: Sequence[Line2D] = ()) -> None:
