@@ -19,7 +19,6 @@ from alphacut.case.content import Case, Content
 from alphacut.case.generated import AnalysisSection
 from alphacut.case.loads import RecordsSection
 from alphacut.case.material import RadiusMapSection
-from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
 from alphacut.commands.options import read_case
@@ -27,6 +26,7 @@ from alphacut.frame.analyses.doubts import load_doubts
 from alphacut.frame.analyses.fragility import FragilityQuestion
 from alphacut.frame.analyses.peaks import Peak, Peaks
 from alphacut.frame.analyses.question import Asked
+from alphacut.frame.analyses.suites import summarised
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, rank, require_writable, say
 from alphacut.io.results import MANIFEST, ResultsFolder
@@ -54,7 +54,6 @@ from alphacut.stages.store import (
     no_progress,
 )
 from alphacut.stages.summary import Results
-from alphacut.stochastic import FittedRadiusMap
 
 
 @contextmanager
@@ -200,9 +199,11 @@ class Pipeline:
         section = self.content.microstructure
         if section is None:
             raise RefusedError("microstructure", None, "a section [microstructure]")
-        draw = None
+        draw: microstructure.Draw | None = None
         if self.figures:
-            draw = _draw_microstructure
+            from alphacut.figures import microstructure as figures  # takes time to import
+
+            draw = figures.draw
         stage = microstructure.stage(section, spheres=self.content.has_spheres, draw=draw)
         return self.store.take(stage)
 
@@ -378,7 +379,14 @@ class Pipeline:
         stages = suite.stages(structure, task, longest_first)
         outcomes = self.store.take_all(stages, self.executor)
         by_record = {record.name: outcomes[f"record_{record.name}"].numbers for record in records}
-        found = suite.suite_peaks(structure, task, records, by_record)
+        found = summarised(
+            suite.linear_model(structure),
+            structure.inputs(task.fuzzy),
+            records,
+            by_record,
+            step=task.section.step,
+            alpha=task.section.alpha,
+        )
         self.results.suite = found
         response: dict[str, Any] = {"peaks": found.peak, "suite": found, **task.times}
         asked = asked_of(structure, task.fuzzy, task.section.alpha)
@@ -415,8 +423,13 @@ class Pipeline:
         if not task.limited:
             return None
         inputs = [structure.model, structure.numbers, task]
-        compute = partial(task.compute_peaks, structure)
-        stage = Stage("peaks", inputs, ("fuzzy", "frame"), dict[str, Peak], compute)
+        stage = Stage(
+            "peaks",
+            inputs,
+            ("fuzzy", "frame"),
+            dict[str, Peak],
+            lambda context: StageResult(task.close_peaks(structure, context.tick)),
+        )
         return self.store.take(stage).numbers
 
     def _compute_shares(self) -> None:
@@ -440,12 +453,3 @@ class Pipeline:
             task = max(results.tasks, key=lambda task: (len(task.fuzzy), task.duration))
             peaks = results.envelopes[task.name].numbers.peak
         results.shares = self.store.take(shares.stage(cells, results.structure, task, peaks))
-
-
-def _draw_microstructure(
-    fitted: FittedRadiusMap, folder: Path, section: MicrostructureSection
-) -> None:
-    """Write the figures of a radius map into a folder."""
-    from alphacut.figures.microstructure import draw  # whose libraries take time to import
-
-    draw(fitted, folder, section)

@@ -21,7 +21,6 @@ from alphacut.io.files import missing
 from alphacut.rve.cell.cell import Cell, Phase, Phases
 from alphacut.rve.cell.lattice import lattice_of
 from alphacut.rve.cell.outline import circle
-from alphacut.rve.models import fitting_models
 from alphacut.rve.result.cell_model import AnyModel, Resolution
 from alphacut.rve.result.moduli import AXES
 from alphacut.rve.result.reference_bounds import reference_bounds
@@ -138,13 +137,6 @@ class CellProblem:
             return None
         return self.modulus.average
 
-    @property
-    def average_name(self) -> str:
-        """Average of the stiffness that gives E and ν: "eq. 16", "isotropic" or "spheres"."""
-        if self.average is None:
-            return "spheres"
-        return AVERAGES[self.average]
-
     def model(self, *, estimate: bool = True, parallel: bool = False) -> AnyModel:
         """Return the model that the sections name: prisms, slices or series, or an own mesh.
 
@@ -163,10 +155,9 @@ class CellProblem:
         # import it, when they are asked for.
         try:
             if isinstance(cell, RoundCell):
-                fitting = fitting_models(cell.particle_kind, is_isotropic=cell.stiffness is None)
                 name = self.modulus.method
                 if name == "auto":
-                    name = next(iter(fitting))
+                    name = next(iter(cell.models))
                 resolution = Resolution(
                     tolerance=self.modulus.tolerance,
                     mesh_size=self.mesh.size,
@@ -180,7 +171,7 @@ class CellProblem:
                     parallel=parallel,
                     estimate=estimate,
                 )
-                return fitting[name].load().with_resolution(resolution)
+                return cell.models[name].load().with_resolution(resolution)
             from alphacut.rve.prism.own_mesh import MeshModel
 
             assert self.mesh.file is not None  # the only other kind of cell is one of a mesh file
@@ -188,8 +179,7 @@ class CellProblem:
             return MeshModel(self.mesh.file, refine=self.mesh.refine, **options)
         except ImportError as error:
             value = self.modulus.method
-            cure = missing(error)
-            raise RefusedError("modulus.method", value, "series", cure) from None
+            raise RefusedError("modulus.method", value, "series", missing(error)) from None
 
     def solve(self, **options: bool) -> HomogenisedStiffness:
         """Return the homogenised stiffness at the nominal values of all parameters.

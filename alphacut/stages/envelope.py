@@ -243,12 +243,6 @@ class EnvelopeTask:
             found = tightest(found, replace(self, limited=loose).close_peaks(structure, progress))
         return found
 
-    def compute_peaks(
-        self, structure: Structure, context: StageContext
-    ) -> StageResult[dict[str, Peak]]:
-        """Compute the peaks of the limited outputs alone."""
-        return StageResult(self.close_peaks(structure, context.tick))
-
     def arguments(self, structure: Structure) -> Document:
         """Return the arguments by name with which `frame.envelope` computes the envelope.
 

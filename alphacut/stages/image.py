@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -92,7 +91,13 @@ def stage(
     # The cell has the names of files alone: their digests make the stage new if a file changes.
     digests = [file_digest(file) for file in files_of(cell.image)]
     inputs = [cell, alpha, average, digests]
-    compute = partial(compute_cuts, cell, alpha, average, device)
+
+    def compute(context: StageContext) -> StageResult[ImageResult]:
+        """Compute α-cuts of the stiffness, and by how much each source widens those of E."""
+        study = study_of(cell)
+        found = solve_study(study, alpha=alpha, average=average, device=device, tick=context.tick)
+        return StageResult(image_result(found), found.to_dataset())
+
     return Stage("image", inputs, ("stochastic", "rve", "fuzzy"), ImageResult, compute)
 
 
@@ -117,28 +122,6 @@ def study_of(cell: ImageCell) -> ImageStudy[ImagePhase]:
         for (young, poisson), loss in zip(cell.pairs, losses, strict=True)
     ]
     return image_study(image, phases, thresholds=cell.threshold or (), labels=cell.labels or ())
-
-
-def compute_cuts(
-    cell: ImageCell, alpha: tuple[float, ...], average: str, device: str, context: StageContext
-) -> StageResult[ImageResult]:
-    """Compute α-cuts of the stiffness of an image, and by how much each source widens those of E.
-
-    Args:
-        cell: Files of the image, and its phases.
-        alpha: Rising α-levels.
-        average: "isotropic" or "axes", the average of the plane stiffness that E and ν belong to.
-        device: "cpu" or "cuda".
-        context: Its `tick` is called with the completed fraction of the work.
-
-    Raises:
-        RefusedError: The image is not read, or the phases do not fit it.
-        FailedError: A linear system was not solved.
-    """
-    found = solve_study(
-        study_of(cell), alpha=alpha, average=average, device=device, tick=context.tick
-    )
-    return StageResult(image_result(found), found.to_dataset())
 
 
 def image_result(found: FuzzyImageStiffness) -> ImageResult:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -39,54 +38,36 @@ def stage(
     # The section holds the name of a file only: its digest makes the stage new if the content is.
     file = section.sources[0].file
     inputs = [section, spheres, file and file_digest(file)]
-    compute = partial(_computed, section, spheres, draw)
+
+    def compute(context: StageContext) -> StageResult[Document]:
+        """Compute the radius map, and write its files if the context has a folder."""
+        packed = 0.35  # fraction of the time that packing takes, measured on cases/concrete.toml
+        particles = section.particles(
+            spheres=spheres,
+            workers=context.workers,
+            progress=subprogress(context.tick, 0.0, packed),
+        )
+        fitted = fit_radius_map(
+            particles,
+            limits=section.limits,
+            seed=section.seed,
+            workers=context.workers,
+            progress=subprogress(context.tick, packed, 1.0),
+        )
+        numbers = fitted.numbers()
+        folder = context.folder
+        if folder is not None:
+            write_text(folder / "radius.toml", fragment(numbers))
+            if draw is not None:
+                draw(fitted, folder / "figures", section)
+            if section.image is not None:
+                # 17 digits give each number back exactly: the file can take the image's place.
+                rows = np.column_stack([particles[0].centres, particles[0].radii])
+                columns = {"header": "x [m],y [m],r [m]", "delimiter": ",", "comments": ""}
+                np.savetxt(folder / "circles.csv", rows, fmt="%.17g", **columns)
+        return StageResult(numbers, fitted.to_dataset())
+
     return Stage("microstructure", inputs, ("stochastic",), Document, compute)
-
-
-def _computed(
-    section: MicrostructureSection, spheres: bool, draw: Draw | None, context: StageContext
-) -> StageResult[Document]:
-    """Compute the radius map of particles and, if the context has a folder, write its files.
-
-    Args:
-        section: The particles, and the seed of all random numbers.
-        spheres: Whether the particles are spheres.
-        draw: Function that draws figures into a folder, or None.
-        context: Folder for files, number of processes, and the function that takes the progress.
-
-    Returns:
-        The parameters and fractions of the map as a document, and a dataset with the distribution
-        of the reduced radius and its bounds.
-
-    Raises:
-        RefusedError: The particles are too dense, or a file is not read.
-        FailedError: Particles still overlap after all steps of the packing, or no map fits.
-    """
-    packed = 0.35  # fraction of the time that packing takes, measured on cases/concrete.toml
-    particles = section.particles(
-        spheres=spheres,
-        workers=context.workers,
-        progress=subprogress(context.tick, 0.0, packed),
-    )
-    fitted = fit_radius_map(
-        particles,
-        limits=section.limits,
-        seed=section.seed,
-        workers=context.workers,
-        progress=subprogress(context.tick, packed, 1.0),
-    )
-    numbers = fitted.numbers()
-    folder = context.folder
-    if folder is not None:
-        write_text(folder / "radius.toml", fragment(numbers))
-        if draw is not None:
-            draw(fitted, folder / "figures", section)
-        if section.image is not None:
-            # 17 digits give each number back exactly, so that the file can take the image's place.
-            rows = np.column_stack([particles[0].centres, particles[0].radii])
-            columns = {"header": "x [m],y [m],r [m]", "delimiter": ",", "comments": ""}
-            np.savetxt(folder / "circles.csv", rows, fmt="%.17g", **columns)
-    return StageResult(numbers, fitted.to_dataset())
 
 
 def fragment(numbers: Mapping[str, Any]) -> str:

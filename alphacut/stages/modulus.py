@@ -33,7 +33,14 @@ from alphacut.rve.fuzzy_cell import (
 from alphacut.rve.guaranteed_cuts import with_guaranteed_cuts
 from alphacut.rve.result.engineering_constants import NAMES
 from alphacut.rve.result.moduli import ISOTROPIC
-from alphacut.stages.cell import GPA, CellProblem, References, key_and_unit, require_levels
+from alphacut.stages.cell import (
+    AVERAGES,
+    GPA,
+    CellProblem,
+    References,
+    key_and_unit,
+    require_levels,
+)
 from alphacut.stages.store import Stage, StageContext, StageResult
 
 if TYPE_CHECKING:
@@ -152,7 +159,7 @@ def modulus_result(problem: CellProblem, stiffness: FuzzyStiffness) -> ModulusRe
         seconds=bounds.seconds,
         nature=stiffness.guarantee,
         particles=problem.cell.particles,
-        average=problem.average_name,
+        average=AVERAGES[problem.average] if problem.average else "spheres",
         error=dict(stiffness.error),
         checks=dict(stiffness.checks),
         references=problem.references(),

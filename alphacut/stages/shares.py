@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 
 from alphacut.base.arrays import Array
 from alphacut.case.structure import Structure
@@ -39,60 +38,40 @@ def stage(
         Stage of a table by result and input, of the fraction by which the width of the result on
         the lowest level falls if the input is fixed at its nominal value.
     """
-    compute = partial(_fractions_of_widths, campaign, structure, task, peaks)
     # Peaks are inputs of this stage too: searches begin there, which can change digits of results.
     of_cell = campaign and [identity(campaign), campaign.inputs, campaign.modulus.alpha]
     of_structure = structure and [structure.model, structure.numbers, task, peaks]
     inputs = [of_cell, of_structure]
-    packages = (*NESTED, "alphacut")
-    return Stage("shares", inputs, packages, ShareTable, compute)
 
+    def compute(_: StageContext) -> StageResult[ShareTable]:
+        """Compute the table.
 
-def _fractions_of_widths(
-    campaign: CellProblem | None,
-    structure: Structure | None,
-    task: EnvelopeTask | None,
-    peaks: Mapping[str, Peak],
-    _: StageContext,
-) -> StageResult[ShareTable]:
-    """Compute the table of fractions of widths, by result and then by input.
-
-    A fraction is that by which the width of a result on the lowest α-level falls if one input is
-    fixed at its nominal value. Results that depend on a single fuzzy input have no row, and only
-    frames with floors have rows of peaks.
-
-    Args:
-        campaign: The cell, for E and ν; None without one.
-        structure: The structure, for its peaks; None without one.
-        task: Fuzzy inputs, duration and time step of its response; None without a structure.
-        peaks: Peaks by output, at whose inputs searches begin.
-        _: Surroundings of the stage, which are not used.
-
-    Raises:
-        CampaignError: Samples of the cell failed.
-        FailedError: A response could not be computed.
-    """
-    table: ShareTable = {}
-    if campaign is not None and len(campaign.inputs) > 1:
-        shares = cell_shares(campaign)
-        for column, name in enumerate(("E", "ν")):
-            fractions = map(float, shares.fraction[:, column])
-            table[name] = dict(zip(shares.names, fractions, strict=True))
-    if structure is None or task is None:
+        Results that depend on a single fuzzy input have no row, and only frames with floors have
+        rows of peaks.
+        """
+        table: ShareTable = {}
+        if campaign is not None and len(campaign.inputs) > 1:
+            shares = cell_shares(campaign)
+            for column, name in enumerate(("E", "ν")):
+                fractions = map(float, shares.fraction[:, column])
+                table[name] = dict(zip(shares.names, fractions, strict=True))
+        if structure is None or task is None:
+            return StageResult(table)
+        # An input such as "m" stands for m1 … mn: they are fixed together, as the case names them.
+        names = structure.with_always_fuzzy(task.fuzzy)
+        if structure.model.floors and len(names) > 1:
+            table |= sensitivity(
+                structure.model,
+                structure.inputs(task.fuzzy),
+                duration=task.duration,
+                step=task.section.step,
+                level=task.section.alpha[0],
+                groups={name: structure.fuzzy_members(name) for name in names},
+                reached_at={name: peak.reached_at for name, peak in peaks.items()},
+            ).shares
         return StageResult(table)
-    # An input such as "m" stands for m1 … mn: they are fixed together, as the case names them.
-    names = structure.with_always_fuzzy(task.fuzzy)
-    if structure.model.floors and len(names) > 1:
-        table |= sensitivity(
-            structure.model,
-            structure.inputs(task.fuzzy),
-            duration=task.duration,
-            step=task.section.step,
-            level=task.section.alpha[0],
-            groups={name: structure.fuzzy_members(name) for name in names},
-            reached_at={name: peak.reached_at for name, peak in peaks.items()},
-        ).shares
-    return StageResult(table)
+
+    return Stage("shares", inputs, (*NESTED, "alphacut"), ShareTable, compute)
 
 
 def cell_shares(campaign: CellProblem) -> WidthFractions:

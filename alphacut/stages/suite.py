@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, cast
 from alphacut.case.loads import RecordsSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
-from alphacut.frame import Limit, Peak, ScaledSuite, SuitePeaks, scale_suite
+from alphacut.frame import Limit, Peak, ScaledSuite, scale_suite
 from alphacut.frame.analyses.fragility import increments_of
 from alphacut.frame.analyses.incremental import IncrementalAnalysis, Increments
 from alphacut.frame.analyses.suites import (
@@ -18,7 +18,6 @@ from alphacut.frame.analyses.suites import (
     record_peaks,
     require_proved,
     scaled_records,
-    summarised,
     thresholds_under,
 )
 from alphacut.frame.records.components import corrected_components
@@ -176,34 +175,6 @@ def _peaks(
     if task.section.method in ("proof", "dual"):
         require_proved(peaks, record.name, structure.unit)
     return StageResult(peaks)
-
-
-def suite_peaks(
-    structure: Structure,
-    task: EnvelopeTask,
-    records: Sequence[ScaledRecord],
-    peaks: Mapping[str, Mapping[str, Peak]],
-) -> SuitePeaks:
-    """Return the largest peaks over the records of a suite, their means and other statistics.
-
-    Args:
-        structure: The structure that the records move.
-        task: Names of the fuzzy inputs, time step and α-levels.
-        records: The scaled records.
-        peaks: Bounds of the peaks by the name of the record and of the peak; one entry for each
-            record.
-
-    Raises:
-        RefusedError: An input is unknown or crisp.
-    """
-    return summarised(
-        linear_model(structure),
-        structure.inputs(task.fuzzy),
-        records,
-        peaks,
-        step=task.section.step,
-        alpha=task.section.alpha,
-    )
 
 
 def incremental_stage(

@@ -19,7 +19,7 @@ from alphacut.frame.analyses.answer import Answer
 from alphacut.frame.analyses.storey_table import assumptions, storey_table
 from alphacut.frame.structures.linear import frequencies
 from alphacut.frame.structures.quantities import output_of
-from alphacut.io.files import Document, as_json
+from alphacut.io.files import Document
 from alphacut.io.results import COMPLETE, RUN_AGAIN, PlainName, ResultsFolder
 from alphacut.io.typed_json import from_document, to_document
 from alphacut.stages.envelope import EnvelopeResult, EnvelopeTask
@@ -267,10 +267,6 @@ class Summary(Parts):
     figures: tuple[PlainName, ...] = ()
     seconds: float
     fingerprints: dict[PlainName, str] = field(default_factory=dict)
-
-    def to_json(self) -> str:
-        """Return the summary as a JSON object."""
-        return as_json(self.parts(), indent=2)
 
     @classmethod
     def read(cls, folder: ResultsFolder) -> Self:
