@@ -133,13 +133,11 @@ class CellContent(Section, defer_build=True):
             allowed = "a mesh of Gmsh beside [cell.phases]"
             require(not isinstance(self.cell, MeshedCell), "mesh.file", None, allowed)
             for key in ("refine", "bounds"):
-                is_meant = not getattr(self.mesh, key)
-                require(is_meant, f"mesh.{key}", True, "true beside mesh.file")
+                require(not getattr(self.mesh, key), f"mesh.{key}", True, "true beside mesh.file")
             # `radius_map` is [radius] if it has a1 … a4, else None.
             if self.radius is not None and self.radius_map is None:
                 about = RadiusMapSection.described_fields()["a1"].description
-                allowed = f"{about}; theta alone beside mesh.file"
-                raise RefusedError("radius.a1", None, allowed)
+                raise RefusedError("radius.a1", None, f"{about}; theta alone beside mesh.file")
             return
         allowed = "[cell.phases], a phase for each physical group of mesh.file"
         require(isinstance(self.cell, MeshedCell), "cell.phases", None, allowed)
@@ -154,8 +152,7 @@ class CellContent(Section, defer_build=True):
         tolerance = self.modulus.tolerance
         allowed = "none beside mesh.file, whose error nobody knows"
         has_error = tolerance is None or self.mesh.refine
-        cure = "set mesh.refine = true"
-        require(has_error, "modulus.tolerance", tolerance, allowed, cure=cure)
+        require(has_error, "modulus.tolerance", tolerance, allowed, cure="set mesh.refine = true")
 
     def _require_stages(self) -> None:
         """Refuse stages without the sections that they need, and several sources of the radius.

@@ -100,8 +100,7 @@ class Content(CellContent):
         if not yields(structure.model):
             return ()
         asked = [x for x in self.questions.values() if x.made_from.reads_peaks]
-        limits = [side for x in asked for y in x.limits_of(structure) for side in y.one_sided]
-        return tuple(limits)
+        return tuple(side for x in asked for y in x.limits_of(structure) for side in y.one_sided)
 
     @property
     def component_count(self) -> int:
@@ -250,8 +249,7 @@ class Content(CellContent):
         """
         section = self.structure_section
         if section is not None:
-            has_ground = section.nominal.model.ground is not None
-            require_alone("records", has_ground, "an accelerogram")
+            require_alone("records", section.nominal.model.ground is not None, "an accelerogram")
             section.require_pattern()
             self._require_directions(records, section)
         # For these sections it is not defined how results under several records make one result.
@@ -330,8 +328,7 @@ class Content(CellContent):
         for section in self.asked().values():
             section.require_answerable(structure, self.component_count)
         if self.identify is not None:
-            is_framed = structure.model.floors > 0
-            require(is_framed, "identify", "without a frame", "beside [frame]")
+            require(structure.model.floors > 0, "identify", "without a frame", "beside [frame]")
             structure.inputs(self.identify.learn, "identify.learn")
 
     def _require_study(
@@ -360,8 +357,7 @@ class Content(CellContent):
                 continue
             acts = history.start < study.duration
             value = f"from {history.start:g} s"
-            allowed = f"a start below {key}.duration"
-            require(acts, f"force[{number}].history", value, allowed)
+            require(acts, f"force[{number}].history", value, f"a start below {key}.duration")
 
     def _require_inputs(self, key: str, names: Sequence[str], structure: Structure) -> None:
         """Refuse inputs of a section that are unknown or crisp.

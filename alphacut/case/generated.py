@@ -168,13 +168,11 @@ class AnalysisSection(MadeSection):
         structure.inputs(random, f"{self.key}.random")
         for name in self.made_from.of_yielding:
             is_used = yields(structure.model) or not self.has_key(name)
-            value = getattr(self, name)
-            require(is_used, f"{self.key}.{name}", value, "beside columns that yield")
+            require(is_used, f"{self.key}.{name}", getattr(self, name), "beside columns that yield")
 
     def require_all_angles(self) -> None:
         """Refuse what is not answered over all angles of incidence of two components."""
-        is_answered = self.made_from.all_angles
-        require(is_answered, self.key, "over all angles", "an angle in records.angle")
+        require(self.made_from.all_angles, self.key, "over all angles", "an angle in records.angle")
 
     def require_computable(self, structure: Structure, fuzzy: Sequence[str]) -> None:
         """Refuse what cannot be computed, once the structure has its materials.

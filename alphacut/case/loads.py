@@ -303,8 +303,7 @@ def _step_of_record(step: float) -> float:
 def _parse_unit(value: object, _: ValidationInfo) -> str:
     """Return a unit of accelerations as it was given, or refuse it."""
     # The unit is converted with the file, so that messages can show it as it was given.
-    is_unit = factor_of(str(value), ACCELERATION) > 0
-    require(is_unit, "", value, f"a unit of {ACCELERATION_UNITS}")
+    require(factor_of(str(value), ACCELERATION) > 0, "", value, f"a unit of {ACCELERATION_UNITS}")
     return str(value)
 
 

@@ -30,17 +30,19 @@ from alphacut.case.types import (
     rising,
 )
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.rve.cell.cell import Phase, VoigtPhase
+from alphacut.rve.cell.cell import AnyPhase, Phase, VoigtPhase
 from alphacut.rve.cell.lattice import Arrangement, lattice_of
 from alphacut.rve.cell.outline import Ellipse, circle, reach
 from alphacut.rve.image.phases import RIGID
-from alphacut.rve.models import fitting_models, known_names
+from alphacut.rve.models import ModelEntry, fitting_models, known_names
 from alphacut.stochastic import FractionMap, HermiteMap, TruncatedNormal
 from alphacut.stochastic.particles.shapes import DISCS, SPHERES, Shape
 
 Radius = Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)]
 
 Number = Annotated[FuzzyNumber, Quantity(fuzzy=True)]
+
+PhasesByName = dict[str, AnyPhase]
 
 # θ is normal before it is cut off: beyond 10 standard deviations there is a probability of 1e-23.
 Theta = Annotated[float, Quantity(minimum=-10, maximum=10)]
@@ -139,11 +141,11 @@ class PhaseSection(Section):
         require(has_ratio == is_isotropic, "", value, allowed)
 
     @property
-    def nominal(self) -> Phase | VoigtPhase:
+    def nominal(self) -> AnyPhase:
         """The material at its nominal Young's modulus, if it is isotropic."""
         return self.extremes(None)[0]
 
-    def extremes(self, level: float | None) -> tuple[Phase | VoigtPhase, Phase | VoigtPhase]:
+    def extremes(self, level: float | None) -> tuple[AnyPhase, AnyPhase]:
         """Return the softest and the stiffest material of an α-cut, or the nominal one twice."""
         if isinstance(self.modulus, VoigtPhase):
             return self.modulus, self.modulus
@@ -176,13 +178,11 @@ class MeshedCell(Section):
         }
 
     @property
-    def nominal_phases(self) -> dict[str, Phase | VoigtPhase]:
+    def nominal_phases(self) -> PhasesByName:
         """Phases by name at the nominal values."""
         return {name: phase.nominal for name, phase in self.phases.items()}
 
-    def extreme_phases(
-        self, level: float | None
-    ) -> tuple[dict[str, Phase | VoigtPhase], dict[str, Phase | VoigtPhase]]:
+    def extreme_phases(self, level: float | None) -> tuple[PhasesByName, PhasesByName]:
         """Return the softest and the stiffest phases of an α-cut by name, or the nominal twice."""
         extremes = {name: phase.extremes(level) for name, phase in self.phases.items()}
         soft = {name: ends[0] for name, ends in extremes.items()}
@@ -204,8 +204,7 @@ class MeshedCell(Section):
         for name, phase in self.phases.items():
             is_complete = phase.loss is not None or not self.losses
             key = f"cell.phases.{name}.loss"
-            allowed = "a loss factor of each phase, 0 for none"
-            require(is_complete, key, None, allowed)
+            require(is_complete, key, None, "a loss factor of each phase, 0 for none")
 
 
 SHAPES = (
@@ -294,17 +293,18 @@ class RoundCell(Section):
         return modulus if isinstance(modulus, VoigtPhase) else None
 
     @property
-    def particle_kind(self) -> str:
-        """Kind of the particles without their measures: cylinders, ellipses or spheres."""
-        return self.particles.partition("(")[0]
+    def models(self) -> dict[str, ModelEntry]:
+        """Models that can solve it by their names, the preferred one first."""
+        kind = self.particles.partition("(")[0]  # without the measures of an ellipse
+        return fitting_models(kind, is_isotropic=self.stiffness is None)
 
     @property
     def methods(self) -> tuple[str, ...]:
         """Words for the models that can solve it."""
-        return "auto", *fitting_models(self.particle_kind, is_isotropic=self.stiffness is None)
+        return "auto", *self.models
 
     @property
-    def nominal_phases(self) -> tuple[Phase, Phase | VoigtPhase]:
+    def nominal_phases(self) -> tuple[Phase, AnyPhase]:
         """Matrix and particle at the nominal values."""
         matrix = Phase(self.matrix_modulus.nominal, self.matrix_poisson.nominal)
         if isinstance(self.inclusion_modulus, VoigtPhase):
@@ -352,14 +352,17 @@ class RoundCell(Section):
         outline = self.outline or circle  # `outline` refuses unknown shapes
         has_ratio = self.inclusion_poisson is not None
         is_isotropic = self.stiffness is None
-        key = "cell.inclusion_poisson"
-        allowed = "a number beside Young's modulus, none beside a stiffness"
-        require(has_ratio == is_isotropic, key, "there" if has_ratio else "missing", allowed)
-        is_solved = is_isotropic or self.particles != "spheres"
-        allowed = "Young's modulus of spheres"
-        require(is_solved, "cell.inclusion_modulus", "a plane stiffness", allowed)
-        has_lattice = self.particles != "spheres" or self.lattice == "square"
-        require(has_lattice, "cell.lattice", self.lattice, '"square", the cubic array of spheres')
+        require(
+            has_ratio == is_isotropic,
+            "cell.inclusion_poisson",
+            "there" if has_ratio else "missing",
+            "a number beside Young's modulus, none beside a stiffness",
+        )
+        if self.particles == "spheres":
+            allowed = "Young's modulus of spheres"
+            require(is_isotropic, "cell.inclusion_modulus", "a plane stiffness", allowed)
+            is_cubic = self.lattice == "square"
+            require(is_cubic, "cell.lattice", self.lattice, '"square", the cubic array of spheres')
         # Let r be the radius divided by half the side of the cell. The largest side coordinate on
         # the outline, which is 1 at the sides, is R r, with R = reach(outline). The particle
         # touches the next cell at R r = 1, and would overlap its image beyond.
@@ -468,8 +471,7 @@ class ImageCell(Section):
         n_sides = len(self.pixel or ())
         require(n_sides <= 2, "cell.pixel", n_sides, "a side, or a width and a height")
         n_sides = len(self.voxel or ())
-        allowed = "a side, or those along x, y and z"
-        require(n_sides in (0, 1, 3), "cell.voxel", n_sides, allowed)
+        require(n_sides in (0, 1, 3), "cell.voxel", n_sides, "a side, or those along x, y and z")
 
     def _require_one(self, key: str, other: str) -> None:
         """Refuse both of two keys, and neither."""

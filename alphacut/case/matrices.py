@@ -17,11 +17,11 @@ from alphacut.base.errors import RefusedError, by_keys, require
 from alphacut.case.structure import (
     LOSS_STAND_IN,
     DampingRatios,
+    Ground,
     MaterialDamping,
     Structure,
     StructureSection,
     damping_ratios_by_name,
-    read_accelerogram,
 )
 from alphacut.case.types import (
     Length,
@@ -34,7 +34,6 @@ from alphacut.case.types import (
     text,
 )
 from alphacut.frame import (
-    Accelerogram,
     MatrixStructure,
     affine_terms,
     damping_from_loss,
@@ -94,10 +93,9 @@ def _array(file: str, info: ValidationInfo) -> Array:
         with suppress(RefusedError):  # of files that name no unknowns
             names = read_unknowns(path, name=member)
             held = read_unknowns(path, name=member, held=True)
-        context = {} if info.context is None else info.context
-        of_files = context.setdefault("names_of_files", {}).setdefault(info.field_name, {})
-        of_files.update(dict.fromkeys(names))
-        context["names_of_files"].setdefault("held", {}).update(dict.fromkeys(held))
+        of_files = (info.context or {}).setdefault("names_of_files", {})
+        for key, found in ((info.field_name, names), ("held", held)):
+            of_files.setdefault(key, {}).update(dict.fromkeys(found))
         _require_shape(path.name, array, rows)
         require_symmetric(path.name, array, unknowns)
     largest = float(np.abs(array).max())
@@ -126,8 +124,7 @@ def _terms_of_exports(value: object, info: ValidationInfo) -> object:
     exports: list[tuple[dict[str, float], Array]] = []
     for export in value:
         is_export = isinstance(export, dict) and isinstance(export.get("file"), str)
-        allowed = 'tables alone, as { file = "soft.mtx", E = "100 GPa" }'
-        require(is_export, "", export, allowed)
+        require(is_export, "", export, 'tables alone, as { file = "soft.mtx", E = "100 GPa" }')
         parameters = {
             name: _parameter(number, info)[0].nominal
             for name, number in export.items()
@@ -330,7 +327,7 @@ class MatricesSection(StructureSection):
     damping_ratio: DampingRatios = ()
     direction: Direction = ""
     directions: tuple[Direction, ...] = ()
-    accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = None
+    accelerogram: Ground | None = None
     outputs: dict[str, ObservedRow]
 
     # Names of unknowns in the files of "mass", "stiffness" and "damping", and of those that a file

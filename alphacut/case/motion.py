@@ -55,8 +55,7 @@ def _parse_tolerance(value: object, info: ValidationInfo) -> Tolerance:
         raise RefusedError("", value, allowed, str(error)) from None
     # A tolerance of the whole peak or more would let every bound pass.
     lower, upper = tolerance.support
-    is_allowed = lower == upper > 0 and (unit != "" or upper < 1)
-    require(is_allowed, "", value, allowed)
+    require(lower == upper > 0 and (unit != "" or upper < 1), "", value, allowed)
     return Tolerance(upper, unit)
 
 

@@ -75,9 +75,9 @@ def parse(
         # once. All problems are reported together, so that a case is mended in one round.
         problems: dict[str, RefusedError] = {}
         for x in _refusals(model, error):
-            place = str(path)
-            if _is_below(x.key, changed):
-                place = "command line"
+            # a key that was changed, or an entry or a key of the table of one
+            is_changed = any(re.match(rf"{re.escape(name)}(?![\w-])", x.key) for name in changed)
+            place = "command line" if is_changed else str(path)
             problem = RefusedError(x.key, x.value, x.allowed, x.cure, place)
             problems[str(problem)] = problem
         if (n_further := error.error_count() - MAX_PROBLEMS) > 0:
@@ -124,8 +124,7 @@ def _parse_toml(path: Path, text: str) -> dict[str, object]:
             r"=\s*[-+]?[\d.]+\s*[A-Za-z%°µμ±]": 'quantities stand in quotes, as "0.01 s"',
             r"=\s*(?!true|false|inf|nan)[A-Za-z]": 'texts stand in quotes, as "auto"',
         }
-        cure = cure_of(shown, cures)
-        problem = RefusedError(shown, f"not TOML: {what}", "", cure, place)
+        problem = RefusedError(shown, f"not TOML: {what}", "", cure_of(shown, cures), place)
         raise BadInput([problem]) from None
 
 
@@ -194,7 +193,7 @@ def _suggested_key(model: type[Section], key: str) -> str:
     section, dot, name = key.rpartition(".")
     if close := nearest(name, _sibling_names(model, key)):
         return f"{section}{dot}{close}"
-    elsewhere = {x.rpartition(".")[2]: x for x in _names_of(model)}
+    elsewhere = {x.rpartition(".")[2]: x for x in keys_of(model)}
     return elsewhere.get(nearest(name, elsewhere), "")
 
 
@@ -237,8 +236,7 @@ def _refusal(model: type[Section], key: str, detail: ErrorDetails) -> RefusedErr
         names = re.findall(r'"([^"]+)"', allowed)
         return RefusedError(key, value, allowed, suggestion(str(given), names))
     if kind == "tuple_type":  # one entry without the brackets of an array
-        cure = f"write {key.rpartition('.')[2]} = [{value}]"
-        return RefusedError(key, value, "an array", cure)
+        return RefusedError(key, value, "an array", f"write {key.rpartition('.')[2]} = [{value}]")
     # What a key takes, by the kind of Pydantic's error; its own messages speak of Python's types.
     allowed_kinds = {
         "bool_type": "true or false",
@@ -265,11 +263,6 @@ def _full_key(location: tuple[int | str, ...]) -> str:
         elif not part.startswith("<"):
             key += f".{part}"
     return key.lstrip(".")
-
-
-def _is_below(key: str, changed: Sequence[str]) -> bool:
-    """Return whether a key was changed, or is an entry or a key of the table of one."""
-    return any(re.match(rf"{re.escape(name)}(?![\w-])", key) for name in changed)
 
 
 def apply_changes(
@@ -301,7 +294,7 @@ def apply_changes(
         # For a key without its section the first section that has it is suggested; for any other
         # unknown key the known one that is spelt most alike.
         if key not in known and not key.startswith(tables):
-            full_keys = [name for name in _names_of(model) if not name.startswith("study.")]
+            full_keys = [name for name in keys_of(model) if not name.startswith("study.")]
             close = [full for full in full_keys if full.endswith(f".{key}")]
             cure = suggestion(key, full_keys) or "docs/case-format.md has all keys"
             if close:
@@ -354,11 +347,6 @@ def keys_of(model: type[Section]) -> dict[str, FieldInfo]:
     """
     every = _walk_keys("", model, described=True)
     return {name: info for name, info, is_section in every if not is_section}
-
-
-def _names_of(model: type[Section]) -> list[str]:
-    """Return the full names of all keys below the class of a section, sections left out."""
-    return [name for name, _, is_section in _walk_keys("", model) if not is_section]
 
 
 def _walk_keys(

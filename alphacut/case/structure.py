@@ -233,6 +233,9 @@ def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
     return ground
 
 
+Ground = Annotated[Accelerogram, text(read_accelerogram)]
+
+
 def damping_ratios_by_name(
     ratios: MaterialDamping | tuple[FuzzyNumber, ...], loss: FuzzyNumber | None
 ) -> dict[str, FuzzyNumber]:
@@ -407,7 +410,7 @@ class Frame(StructureSection):
     rayleigh_mass: Rate = ZERO
     rayleigh_stiffness: Delay = ZERO
     rayleigh_of: Literal["initial", "tangent"] = "initial"
-    accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = None
+    accelerogram: Ground | None = None
     outputs: Annotated[tuple[str, ...], NotEmpty] = ()
 
     @property

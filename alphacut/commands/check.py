@@ -54,15 +54,21 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         from alphacut.stages.image import study_of  # whose solvers take time to import
 
         study = study_of(content.image_cell)
-    text = text_table(("key", "value", "kind"), rows)
+    keys = ("key", "value", "kind")
+    text = text_table(keys, rows)
     text += "".join(f"warning: {doubt}\n" for doubt in doubts(content, rows, structure))
     if study is not None:
         phases = (f"{name} {fraction:.2%}" for name, fraction in study.fractions.items())
         text += f"image: {study.extent}\nphases: {', '.join(phases)}\n"
         if study.percolation is not None:
             text += percolation_text(study.percolation)
-    document: dict[str, object] = {"case": options.case, "stages": list(content.stages)}
-    document |= {"period_s": None, "modes": None}
+    document: dict[str, object] = {
+        "case": options.case,
+        "stages": list(content.stages),
+        "period_s": None,
+        "modes": None,
+        "inputs": [dict(zip(keys, row, strict=True)) for row in rows],
+    }
     if structure is not None and structure.linear is not None:
         from alphacut.commands.motion_text import (
             matrices_text,
@@ -80,13 +86,11 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         others: list[NominalModes] = []
         if section is not None and isinstance(structure.linear, MatrixStructure):
             text += matrices_text(structure.linear, section.places, modes)
-            for _, influence in structure.linear.components:
-                others.append(nominal_modes(replace(structure.linear, pattern=influence)))
+            patterns = [pattern for _, pattern in structure.linear.components]
+            others = [nominal_modes(replace(structure.linear, pattern=x)) for x in patterns]
         is_shaken = content.records is not None or structure.linear.ground is not None
         text += modes_text(modes, others, is_shaken=is_shaken)
         text += motion_text(content, structure, records)
-    keys = ("key", "value", "kind")
-    document["inputs"] = [dict(zip(keys, row, strict=True)) for row in rows]
     if options.quiet or options.json == "-":
         # Nobody reads the text then: warnings go to standard error, as those of other commands.
         for line in text.splitlines():

@@ -18,7 +18,7 @@ from alphacut.base.number_text import text_table
 from alphacut.commands.options import read_case, write_answer
 from alphacut.commands.pipeline import Pipeline, open_results
 from alphacut.fuzzy.campaign.workers import pool
-from alphacut.io.files import say
+from alphacut.io.files import as_json, say
 from alphacut.io.provenance import FORMAT, command_line, command_to_paste, versions
 from alphacut.io.results import ResultsFolder
 from alphacut.io.typed_json import to_document
@@ -86,7 +86,7 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
             seconds=time.perf_counter() - start,
             fingerprints=results.fingerprints,
         )
-        store.put_text(SUMMARY, summary.to_json())
+        store.put_text(SUMMARY, as_json(summary.parts(), indent=2))
     write_answer(options, summary.parts(), out, run_text(summary))
     if options.json != "-" and not options.quiet:
         say(f"results are in {folder}, after {summary.seconds:.0f} s")

@@ -170,8 +170,7 @@ class ResultsFolder:
         """
         is_own = os.path.lexists(self.path / MANIFEST) or not any(self.path.glob("[!.]*"))
         allowed = "an empty folder, or one of results"
-        cure = "name another folder"
-        require(is_own, option, f"{self.path}, with other files", allowed, cure)
+        require(is_own, option, f"{self.path}, with other files", allowed, "name another folder")
 
     def made_from(self, source: str) -> tuple[str, ...]:
         """Return the names of the files that were made from what has this digest."""
@@ -201,8 +200,7 @@ class ResultsFolder:
         except OSError as error:
             state = None if isinstance(error, FileNotFoundError) else "no regular file"
             raise RefusedError(str(file), state, COMPLETE, RUN_AGAIN) from None
-        is_same = digest in ("", digest_of(content))
-        require(is_same, str(file), "changed", COMPLETE, cure=RUN_AGAIN)
+        require(digest in ("", digest_of(content)), str(file), "changed", COMPLETE, cure=RUN_AGAIN)
         return content
 
     def dataset(self, name: str) -> xarray.Dataset:

@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import xarray
 
-from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError
 from alphacut.base.number_text import ShownUnit, Table
 from alphacut.case.analyses import ANALYSES
@@ -168,13 +167,10 @@ def plot(
         values = dataset[side].transpose("alpha", "output", "time").values.astype("<f4")
         if side == "error" and study.nature is Nature.GUARANTEED:
             values = 0 * values
-        document[side] = [[_in_base64(series) for series in level] for level in values]
+        document[side] = [
+            [base64.b64encode(series.tobytes()).decode() for series in level] for level in values
+        ]
     return document
-
-
-def _in_base64(series: Array) -> str:
-    """Return the bytes of an array in base64."""
-    return base64.b64encode(series.tobytes()).decode()
 
 
 class Figures:

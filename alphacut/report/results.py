@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
-from textwrap import wrap
+from textwrap import fill
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -104,14 +104,11 @@ def run_text(parts: Parts, *, every_constant: bool = False) -> str:
     sentences.extend(drivers(parts))
 
     # Readers who do not know α-cuts are told once, before the first number.
-    text = ""
-    if shown:
-        text = f"{MEANING}\n"
+    text = f"{MEANING}\n" if shown else ""
     for table in shown:
         text += text_table(table.head, table.rows)
     for sentence in sentences:
-        for line in wrap(sentence, 80, subsequent_indent="  "):
-            text += f"{line}\n"
+        text += fill(sentence, 80, subsequent_indent="  ") + "\n"
     return text
 
 
@@ -229,11 +226,7 @@ def _constants(part: ModulusResult | ImageResult, *, every_constant: bool) -> It
         for definition, by_name in part.plane.items():
             for name, cuts in by_name.items():
                 constants[f"{constant_label(name)} ({definition})"] = cuts
-    # The declared error is the largest of all samples, so it widens the range on the lowest level;
-    # the value on the highest one is shown as it was computed.
-    highest = cut_text(young, -1, part.nature)
-    lowest = cut_text(young, 0, part.nature, error)
-    yield MaterialRow(f"E, GPa ({part.average})", highest, lowest, part.nature, error_words)
+    yield _constant_row(f"E, GPa ({part.average})", young, part.nature, error_words, error)
     for label, cuts in constants.items():
         yield _constant_row(label, cuts, nature_of_constants)
     yield from _loss_rows(part, every_constant=every_constant)
@@ -262,11 +255,14 @@ def _loss_rows(part: ModulusResult | ImageResult, *, every_constant: bool) -> It
                 yield _constant_row(f"loss factor of {name}", cuts, part.loss.nature, error_words)
 
 
-def _constant_row(label: str, cuts: Ends, nature: Nature, error_words: str = "") -> MaterialRow:
-    """Return the row of a constant from its α-cuts, which are shown as they are."""
+def _constant_row(
+    label: str, cuts: Ends, nature: Nature, error_words: str = "", error: float = 0.0
+) -> MaterialRow:
+    """Return the row of a constant from its α-cuts, and from its error, if one is declared."""
+    # The declared error is the largest of all samples, so it widens the range on the lowest level;
+    # the value on the highest one is shown as it was computed.
     highest = cut_text(cuts, -1, nature)
-    lowest = cut_text(cuts, 0, nature)
-    return MaterialRow(label, highest, lowest, nature, error_words)
+    return MaterialRow(label, highest, cut_text(cuts, 0, nature, error), nature, error_words)
 
 
 def without_empty_columns(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
@@ -280,11 +276,6 @@ def without_empty_columns(head: Sequence[str], rows: Sequence[Sequence[str]]) ->
     columns = [k for k in range(len(head)) if any(row[k] not in ("", "none") for row in rows)]
     filled_rows = [tuple(row[k] for k in columns) for row in rows]
     return Table(tuple(head[k] for k in columns), filled_rows)
-
-
-def mesh_words(nature: Nature) -> str:
-    """Return a sentence, without its full stop, on the bounds of a mesh from a file."""
-    return BOTH_BOUNDS if nature is Nature.GUARANTEED else UPPER_BOUND
 
 
 def material_sentences(parts: Parts) -> Iterator[str]:
@@ -420,9 +411,8 @@ def _shown_levels(studies: Iterable[EnvelopeResult | SuitePeaks], alpha: Array) 
 
 def shown_peaks(study: EnvelopeResult | SuitePeaks) -> dict[str, Peak]:
     """Return the peaks of a study, or those of the outputs alone that the case names for it."""
-    if not isinstance(study, EnvelopeResult) or not study.drawn:
-        return study.peak
-    return {name: peak for name, peak in study.peak.items() if name in study.drawn}
+    named = getattr(study, "drawn", ()) or study.peak
+    return {name: peak for name, peak in study.peak.items() if name in named}
 
 
 def peak_cells(peak: Peak, factor: float, levels: Sequence[int]) -> list[str]:
@@ -524,7 +514,7 @@ def natures(parts: Parts) -> Iterator[str]:
     """
     suite = parts.records
     if parts.modulus is not None and parts.modulus.particles == "mesh":
-        yield mesh_words(parts.modulus.nature)
+        yield BOTH_BOUNDS if parts.modulus.nature is Nature.GUARANTEED else UPPER_BOUND
     over = "over time"
     if not all(study.is_over_time for study in parts.envelopes.values()):
         over = "over as many periods of the force as its nominal frequency has in the duration"
