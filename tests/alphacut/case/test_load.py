@@ -13,7 +13,7 @@ from alphacut.case.content import load
 from alphacut.frame import Exact, LinearFlow, StoreyFrame
 from alphacut.fuzzy import Interval, Triangular
 from tests.alphacut.case import files
-from tests.alphacut.small import CELL, FRAME, refusals, table_of, written
+from tests.alphacut.small import FRAME, refusals, table_of, written
 
 ROOT = Path(__file__).parents[3]
 
@@ -41,12 +41,6 @@ def test_sections_hold_objects_in_si_and_change_from_the_command_line(tmp_path):
     assert content.envelope.duration == 2.0
     assert content.envelope.tolerance.value == 1e-4
     assert content.structure.inputs(("E", "m")).keys() == {"E", "m1"}
-
-
-def test_a_cell_is_round_or_an_image(tmp_path):
-    assert read(tmp_path, CELL).particle_cell.particles == "cylinders"
-    path = ROOT / "cases/composite.toml"
-    assert load(path).content.image_cell.pairs[0][0] == Triangular(19e9, 20e9, 21e9)
 
 
 def test_all_problems_come_at_once_with_their_file(tmp_path):
