@@ -35,8 +35,6 @@ def test_what_is_no_quantity_is_refused(text, unit, words):
     [
         ("40 Millimetres", r"did you mean mm\?"),
         ("40 kn", r"did you mean kN\?"),
-        ("60 tons", "write t"),
-        ("3,5 m", "a decimal point"),
         ("12 parsec fuzz", "none of a quantity such as"),
     ],
 )
