@@ -35,7 +35,7 @@ quick:
 test-slow:
 	$(IN) python -m pytest -m slow -n $(WORKERS) --dist worksteal --timeout 3000 $(PYTEST)
 
-SEEDS = 3 --seconds 20 --not-slow
+SEEDS = 2 --seconds 15 --not-slow
 test-seeds:
 	$(IN) python -m tests.seeds $(SEEDS)
 

