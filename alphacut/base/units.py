@@ -252,11 +252,11 @@ def folded(text: str) -> str:
 
 
 def decoded(content: bytes) -> str:
-    """Return the text of a content in UTF-8, else in Latin-1, its signs in their plain form."""
+    """Return the text of a content in UTF-8, its signs in their plain form, else in Latin-1."""
     try:
         return folded(content.decode("utf-8-sig"))
     except UnicodeDecodeError:
-        return folded(content.decode("latin-1"))
+        return content.decode("latin-1")
 
 
 def has_unknown_words(text: str) -> bool:
@@ -289,7 +289,7 @@ def _joined_atom() -> re.Pattern[str]:
     # A blank joins a negative power, and what follows a force: "cm s-2" and "kN s/m".
     mark = (
         r"(\s*/\s*\(?|[\s_]*(?<![a-z])(?:per|pro|par|por)[\s_]+|_p?(?=s\^?2)|\s*[*·×]\s*|[-.](?=[a-z])"
-        r"|\s+(?=[^\W\d_]+\s*(?:\^|\*\*)?\s*[({]?-\d)|(?-i:(?<=[Nf])\s+(?=[cm]?m\b|s\b)))"
+        r"|\s+(?=[^\W\d_]+\s*(?:\^|\*\*)?\s*[({]?-\d)|(?-i:(?<=[Nf])\s+(?=[cm]?m\b|s\^?2?\b)))"
     )
     return re.compile(f"{mark}?{atom}", re.IGNORECASE)
 

@@ -52,9 +52,9 @@ class ModeRows:
 
 # Words of numbers that are no frequencies in a unit, but periods, angular ones or quotients.
 _OTHER_NUMBERS = (
-    r"(?i)\b(?:omega\w*|angular|circular|pulsations?|eigenvalues?|lambda|2\s*[x×*·]?\s*pi"
+    r"(?i)\b(?:omega\w*|angular|circular|puls\w+|eigenvalues?|lambda|2\s*[x×*·]?\s*pi"
     r"|ratios?|relative|reduced|per\s?cent|db|decibels?|half)\b|p[eé]r[ií]od(?!og|ic)|dauer\b|\b1\s*/\s*f|ω|2\s*[x×*·]?\s*π|^T\b|\bf\w?\s*/\s*f"
-    rf"|{FACTOR}|{TRANSFORMED}|\bper\s+minute|\b(?:kreis|winkel)frequen"
+    rf"|{FACTOR}|{TRANSFORMED}|\bper\s+minute|\b(?:kreis|winkel)\w*frequen"
 )
 _RELATIVE = (
     r"(?i)(?:std|deviation|scatter|error|uncertaint)\w*\b.*(?:%|\bper\s?cent|\brelative|\bratio)"

@@ -243,7 +243,8 @@ def named_quantity(text: str) -> str:
     if re.search(r"(?:\b|_)(?:a|acc(?:el(?:s|eration\w*)?)?|ag)(?:\b|_)", text, re.IGNORECASE):
         return ""
     words_of_quantities = {
-        "a displacement": r"disp(?:l\w*)?|d[ée]placements?|desplaz\w+|deflection|drift",
+        "a displacement": r"disp(?:l\w*)?|d[ée]placements?|desplaz\w+|spostament\w*|verschieb\w*"
+        r"|deflection|drift",
         "a velocity": r"vel(?:oc\w*)?|speed|vitesses?|geschwindigkeit|скорост\w",
         "a spectrum": r"p?sa",
         "a force": r"forces?|loads?|thrust|(?:base )?shear",

@@ -59,13 +59,15 @@ _QUANTITIES = {
     "kg m2 rad-1 s-2": "stiffness", "kg s-1": "damping", "kg m2 s-1": "damping",
     "kg m2 rad-1 s-1": "damping", "kg m s-1": "damping",
 }  # fmt: skip
+_UNKNOWN_PART = r"(?i)(?<![^\W\d_])(?!mass)[^\W\d_]{2,4}\s*/\s*$"
 _NAMES = {"mass": "mass|trägheit", "stiffness": "stiff|steif|rigid", "damping": "damp|dämpf|amort"}
 # What stands before the unit of all entries, where that has a number.
 _IN_UNITS = r"(?i)\b(?:in|units?(?:\s+of)?)\W*$|[\[(]\s*$|^\W*$"
 # Words of numbers that are no entries in units of SI, whatever units stand beside them.
 _OTHER_NUMBERS = (
     r"(?i)\b(?:weights?|compliance|flexibility|half|halved|doubled|twice|imperial|cgs|customary|ratios?"
-    rf"|relative|us\s+units)\b|%|\bper\s?cent|\bmass\w*\s+as\s+forces?|{TRANSFORMED}|\b[KMC]\^?\(?-1\b"
+    rf"|relative|us\s+units|wtmass\W+(?!1?\.?0*\s*$).*)\b|%|\bper\s?cent|\bmass\w*\s+as\s+forces?"
+    rf"|{TRANSFORMED}|\b[KMC]\^?\(?-1\b|\b[KMC]\s*/\s*[a-z]{{1,3}}\b"
 )
 
 
@@ -146,7 +148,9 @@ def _texts_in(path: Path, member: str) -> Iterator[tuple[str, str]]:
     if suffix in (".npz", ".npy", ".op4", ".full"):
         return
     content = path.read_bytes()
-    for comment in re.finditer(rb"(?m)(?:^[ \t]*(?:%(?!%MatrixM)|\$|\*\*|//)|#).*$", content):
+    for comment in re.finditer(
+        rb"(?m)(?:^[ \t]*(?:%(?!%MatrixM)|\$|\*\*|//)|#|PARAM\W+WTMASS).*$", content
+    ):
         row = content.count(b"\n", 0, comment.start()) + 1
         yield decoded(comment[0]).lstrip(" \t%#$*/"), f"line {row}"
 
@@ -182,6 +186,8 @@ def _stated_factor(path: Path, member: str, quantity: str) -> float:
         is_other = re.search(_OTHER_NUMBERS, rest) is not None and not is_mass
         # Of a unit in a script that is not known nothing would be seen.
         is_other |= not units and has_unknown_words(rest)
+        # Of a unit of which a part is not known, as "Tn/m", nothing else would be seen.
+        is_other |= any(re.search(_UNKNOWN_PART, x.before) for x in units)
         is_other |= any(x.dimension == "" and x.is_sure and not x.numbers for x in units)
         allowed = "entries of stiffness, damping or mass in units"
         require(is_name or not is_other, place, line.strip()[:60], allowed, cure)
@@ -208,7 +214,8 @@ def _stated_factor(path: Path, member: str, quantity: str) -> float:
                 kind = _QUANTITIES.get(one.dimension, "force" if is_force else "")
                 kinds |= {kind} if where is stated else set()
     found = settled(path.name, "unit", stated)
-    kinds = kinds or (named if len(named) == 1 else kinds)
+    if kinds <= {""} and len(named) == 1:
+        kinds |= named
     # A unit of forces alone, or beside one of masses, is one of a system of units.
     is_system = kinds <= {"", "mass"} and kinds != {"mass"}
     is_asked = not quantity or quantity in kinds or is_system

@@ -237,7 +237,7 @@ def _spacing_of(path: Path, picture: Image) -> StatedSpacing:
     scale = re.search(rb"sCAL\x01([\d.eE+-]+)\0([\d.eE+-]+)", path.read_bytes())
     if picture.format == "PNG" and scale is not None:
         return StatedSpacing([float(scale[1]), float(scale[2])], ["m", "m"])
-    x, y = picture.info.get("dpi", (1, 1))
+    x, y = picture.info.get("dpi", picture.info.get("aspect", (1, 1)))
     return spacing_of_resolution(float(x), float(y))
 
 

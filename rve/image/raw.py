@@ -159,7 +159,8 @@ def read_head(path: Path, sides: Sequence[float], override: Collection[str] = ()
     layout = _layout(name, entries)
     order = np.argsort(layout.axes)  # of the axes of the file along x, y, z
     lengths = [float(layout.lengths[axis]) for axis in order]
-    units = re.findall(r'[^\s"]+', entries.value("units", "space units", "distanceunits"))
+    text = entries.value("units", "space units", "distanceunits")
+    units = [quoted or bare for quoted, bare in re.findall(r'"([^"]*)"|([^\s"]+)', text)]
     units = [""] * 3 if len(units) not in (1, 3) or units == ["?"] else (3 * units)[:3]
     # Units stand in the order of the axes of the file, those of a space in that of x, y and z.
     in_file_order = "units" in entries.values

@@ -35,8 +35,11 @@ _OTHERS = (
     r"|crop|wall|core\b|spot|stage"
 )
 _AXIS = r"(?i)(?:(?:^|[\W_])[dvΔδ]?|\bd)([xyz]{1,3})[\"']?\s*[:=]*\s*$"
-# A number of one axis without a unit.
-_BARE_AXIS = rf"(?i)\bd?([xyz])[\"']?\s*[:=]\s*({NUMBER})(?!\s*[a-zμ])"
+# A number of one axis, or of a pixel, without a unit.
+_BARE_SIDE = (
+    rf"(?i)\b(?:d?([xyz])|(?:pixel|voxel)[\s_]?(?:size|spacing))[\"']?\s*[:=]\s*({NUMBER})"
+    r"(?![ \t]*[a-zμ.\d])"
+)
 
 
 class StatedSpacing(NamedTuple):
@@ -97,7 +100,7 @@ def require_spacing(
         factors = [scales[0]] * len(stated)
     what = f"said to have voxels of {' × '.join(f'{side:g} m' for side in expected)}"
     are_alike = all(math.isclose(stated[k] * factors[k], expected[k], rel_tol=0.01) for k in known)
-    require(are_alike, name, what, shown, "give the voxel as it is")
+    require(are_alike, name, what, shown, 'give the voxel as it is, or say override = ["voxel"]')
     values = dict(enumerate(expected))
     if len(expected) == VOLUME:
         values[VOLUME] = math.prod(expected)
@@ -149,9 +152,9 @@ def _lengths_in(text: str, counts: Sequence[int]) -> Iterator[_Length]:
     found = mentions(text)
     unit = unit_in_texts([text])
     if unit and not re.search(_OTHERS, text):
-        for match in re.finditer(_BARE_AXIS, without_units(text, found)):
+        for match in re.finditer(_BARE_SIDE, without_units(text, found)):
             side = Stated(factor_of(unit, "m") * float(match[2]), match[0])
-            yield _Length(("xyz".index(match[1].lower()),), side)
+            yield _Length(("xyz".index(match[1].lower()),) if match[1] else (0, 1), side)
     groups: list[list[Mention]] = []
     for one in found:
         # Numbers with a unit each, as "2um;2um;5um", are those of one axis after another.
@@ -251,6 +254,7 @@ def spacing_of_tags(tags: Mapping[int, object]) -> StatedSpacing:
     """
     words = {code: _plain(text) for code, text in tags.items() if isinstance(text, str)}
     description = words.pop(270, "")
+    words.pop(269, "")  # of a file, whose name states nothing
     texts = list(words.values())
     # Lists of settings of Zeiss and FEI, whose lengths without a unit are in m.
     settings = folded("\n".join(str(tags.get(code, "")) for code in (34118, 34680, 34682)))

@@ -149,6 +149,8 @@ def test_other_arguments_are_refused(tmp_path, name, options, key):
         ("# percent of 10 Hz\nmode,frequency,q1,q2", "Hz", None),
         ("# first at 1.5 Hz\nmode,frequency,q1,q2", "kHz", None),
         ("# Eigenperioden\nmode,frequency,q1,q2", "Hz", None),
+        ("# pulsazioni\nmode,frequency,q1,q2", "Hz", None),
+        ("# Kreiseigenfrequenzen\nmode,frequency,q1,q2", "Hz", None),
         ("# Schwingungsdauer\nmode,frequency,q1,q2", "Hz", None),
     ],
 )

@@ -260,6 +260,9 @@ def test_an_archive_that_unpacks_to_more_than_memory_is_refused(tmp_path, monkey
         ("columns of 2000 kN/m", None),
         ("square root of K", None),
         ("K/1000", None),
+        ("K / EI", None),
+        ("rigidez en Tn/m", None),
+        ("тс/м", None),
         ("K^-1", None),
         ("reduced by factor 10", None),
         ("decanewton", None),
@@ -303,6 +306,8 @@ def test_units_tell_the_quantity_and_names_of_files_state_none(tmp_path):
     (tmp_path / "s.csv").write_text("# units: kN, m, t\n2,-1\n-1,2\n")
     (tmp_path / "w.csv").write_text("# W [kN]\n2,-1\n-1,2\n")
     (tmp_path / "c.csv").write_text("# lumped mass matrix\n2,-1\n-1,2\n")
+    (tmp_path / "r.csv").write_text("# rigidezza, kN su m\n2,-1\n-1,2\n")
+    (tmp_path / "f.csv").write_text("# kN s2/m\n2,-1\n-1,2\n")
     np.savez(tmp_path / "p.npz", k=matrix, meta='{"units": "kN/m"}')
     cases = {
         "K_kN_per_m.npy": (1, {"mass", "stiffness", "damping"}),
@@ -313,6 +318,8 @@ def test_units_tell_the_quantity_and_names_of_files_state_none(tmp_path):
         "s.csv": (1e3, {"mass", "stiffness", "damping"}),
         "w.csv": (1e3, set()),
         "c.csv": (1, {"mass"}),
+        "r.csv": (1e3, {"stiffness"}),
+        "f.csv": (1e3, {"mass"}),
         "p.npz": (1e3, {"stiffness"}),
     }
     for name, (factor, quantities) in cases.items():

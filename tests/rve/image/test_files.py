@@ -477,6 +477,7 @@ def test_units_of_single_axes_are_compared_and_may_be_overridden(tmp_path, rng):
         ("nrrd", "# 2 µm in the plane\n# 5 µm across", (2, 2, 5)),
         ("nrrd", 'spacings: 2 2 5\nlabels: "x [um]" "y [um]" "z [um]"', (2, 2, 5)),
         ("nrrd", "spacings: 1 1 2.5\n# 2 µm, 5 µm", (2, 2, 5)),
+        ("nrrd", "content: {unit: m, pixel_size: 2e-6}", (2, 2, 5)),
         ("nrrd", "# extent: 14 x 10 x 60 micrometres", (2, 2, 5)),
         ("mhd", "Comment = field of view 14 um x 10 um x 60 um", (2, 2, 5)),
         ("nrrd", "spacings: 20000 20000 50000\n# unit: Å", (2, 2, 5)),
