@@ -161,7 +161,8 @@ class TextStatements:
             rest = bare.sub(" ", rest)
         # In words of a language that is not known here, a number may be the step or the rate.
         is_unknown = has_unknown_words(rest)
-        if is_unknown:
+        # Words in square brackets are a unit, whether it is known or not.
+        if is_unknown or re.search(r"\[[^\W\d_][^\[\]]*\]", rest):
             self.unsure_units.append(Stated(nan, text.strip()[:60], place))
         is_sampling = is_unknown or re.search(_SAMPLING, text) is not None
         for match in _LONE_NUMBER.finditer(_COUNT.sub(" ", rest)):

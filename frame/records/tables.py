@@ -476,18 +476,11 @@ def _unit_of(
     if not own:
         found.units += of_heads.units
         found.unsure_units += of_heads.unsure_units
-    label = column
-    if table.width == 1 and table.titles and not found.units:
-        title = file.lines[table.titles[-1]]
-        label = _Column.of(title)
-        is_unit = "[" in title or "/" in label.unit
-        if label.is_time or not is_unit or factor_of(label.unit, ACCELERATION):
-            label = _Column(label.name)
-    named = named_quantity(label.name)
-    parsed = unit_of(label.unit)
+    named = named_quantity(column.name)
+    parsed = unit_of(column.unit)
     by_unit = parsed.other_quantity if parsed else ""
     if by_unit:
-        by_unit += f" by its unit {label.unit}"
+        by_unit += f" by its unit {column.unit}"
     elsewhere = ""
     line = table.start
     if not own and not found.units and not re.search(r"(?:\b|_)acc", column.name):
@@ -503,8 +496,8 @@ def _unit_of(
         raise file.refusal(line, table.file.lines[line], EXPECTED_HEAD, cure)
     if "unit" in override and unit:
         own = own[:1]
-    elif label.unit and not factor_of(label.unit, ACCELERATION) and not found.units:
-        raise table.refusal(f"{label.unit[:40]} is no unit of accelerations: mend the head")
+    elif column.unit and not factor_of(column.unit, ACCELERATION) and not found.units:
+        raise table.refusal(f"{column.unit[:40]} is no unit of accelerations: mend the head")
     elif factors := [*found.factors, *of_heads.factors]:
         text = file.lines[factors[0]].strip()
         cure = "multiply the numbers by it, and mend the line"

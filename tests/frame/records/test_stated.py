@@ -332,6 +332,14 @@ def test_words_of_another_script_are_held_for_the_unit_and_the_step(tmp_path, en
     assert read_record(path, unit="g", step=0.02, override=["unit"]).step == 0.02
 
 
+@pytest.mark.parametrize("title", ["Accel [furlong/s^2]", "# record of 3 May\n# Accel [EU]"])
+def test_words_in_square_brackets_are_a_unit(tmp_path, title):
+    path = saved(tmp_path, f"{title}\n# dt = 0.02 s\n", COLUMN)
+    with pytest.raises(RefusedError, match=r'override = \["unit"\]'):
+        read_record(path, unit="g")
+    assert read_record(path, unit="g", override=["unit"]).step == 0.02
+
+
 def test_a_unit_that_is_said_is_compared_with_a_letter_that_may_be_one(tmp_path):
     path = saved(tmp_path, "station x, g\ndt = 0.01 s\n", COLUMN)
     with pytest.raises(RefusedError, match=r"say records\.unit"):
