@@ -320,7 +320,8 @@ class InterpolatedFrame:
                 degree + _degree(x) + of_speed * bool(x[n : 2 * n].magnitude().any()) for x in rows
             ]
         order = max(_degree(x) for x in found[:-2])
-        fine = max(2 * degree + order, row_degrees.max(initial=0))
+        coarse = max(degree + order, int(row_degrees.max(initial=0)))
+        fine = max(2 * degree + order, coarse)
         points = grid(d, fine)
         lowest = Properties(*(x.bounds()[0] for x in found))
         # Products of the lower ends of factors are lower ends, too, and closer where the hardening
@@ -354,6 +355,7 @@ class InterpolatedFrame:
             inputs=d,
             degree=degree,
             fine=fine,
+            coarse=coarse,
             of_slider=degree + max(_degree(found.slider), _degree(found.force)) if d else 0,
             place=z,
             follow=np.ascontiguousarray(follow),
@@ -369,7 +371,7 @@ class InterpolatedFrame:
         others = magnitude[:, n : 2 * n] ** 2 @ model.high.inverse_mass
         others += magnitude[:, 2 * n] ** 2 * model.high.slider
         return model, OutputRows(
-            factors=np.array([_on_grid(x, points) for x in rows]),
+            factors=np.array([_on_grid(x, grid(d, coarse)) for x in rows]),
             remainder=np.array([x.remainder for x in rows]),
             magnitude=magnitude,
             by_norm=np.sqrt(others + by_drift.sum(axis=1)),
@@ -439,14 +441,19 @@ class InterpolatedFrame:
         """Return bounds by what interpolated motions miss, or None where they go too far astray."""
         give_up = np.inf if room is None else GIVE_UP * float(room.max())
         small = 0.0 if room is None else SMALL_VIOLATION * float(room.min())
-        size = max(CHUNK // (MAX_TERMS * 3 * model.grid.mass.size), 4)
+        varies = np.ptp(elements.length, axis=1) > 0
+        groups: list[tuple[BoxModel, Ints]] = []
+        for of_group, mask in ((model.fixed, ~varies), (model, varies)):
+            numbers = np.flatnonzero(mask)
+            size = max(CHUNK // (MAX_TERMS * 3 * of_group.grid.mass.size), 4)
+            starts = range(0, len(numbers), size)
+            groups += [(of_group, numbers[first : first + size]) for first in starts]
         of_path = rows.magnitude[:, -1]
         start = _start_error(model, elements)
         norm = np.full(model.parts**model.inputs, start)
         swept = []
-        for first in range(0, len(elements.phase), size):
-            chosen = slice(first, first + size)
-            found = interpolate(model, elements, chosen, with_rates=rows.uses_rates)
+        for of_group, chosen in groups:
+            found = interpolate(of_group, elements, chosen, with_rates=rows.uses_rates)
             if found is None:
                 return None
             missed = defects(found, small)
@@ -459,14 +466,15 @@ class InterpolatedFrame:
             low = high = at_end  # no matter if no output uses the path
             if of_path.any():
                 matrix = bernstein_matrix(found.terms - 1, SIDE_PARTS)
-                middle, radius = model.ranges(matrix @ found.elastic_force)
+                middle, radius = of_group.ranges(matrix @ found.elastic_force)
                 radius += missed.level[:, np.newaxis]
                 shape = (len(error), SIDE_PARTS, found.terms)
                 low = (middle - radius).reshape(shape).min(axis=2)
                 high = (middle + radius).reshape(shape).max(axis=2)
             upper = polygons(found, values)
             swept.append(_Swept(*missed, found.times, upper, error, at_end, low, high))
-        done = _Swept(*map(np.concatenate, zip(*swept, strict=True)))
+        in_time = np.argsort(np.concatenate([chosen for _, chosen in groups]))
+        done = _Swept(*(np.concatenate(x)[in_time] for x in zip(*swept, strict=True)))
 
         # Errors of the motion, on parts of the box and at the ends of elements. The drift without
         # hardening is off by ∫ (‖b‖ S + |bᵀ δ_q|) dt at most, with the norm of b in M⁻¹.

@@ -8,7 +8,7 @@ grid of inputs have it as their last axis; e counts elements, k powers of τ.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Generic, NamedTuple, TypeVar
 
@@ -65,6 +65,7 @@ class BoxModel:
         inputs: Number d of inputs.
         degree: Degree of the interpolation of motions in each input.
         fine: Degree of the grid, at which products of a length, a property and a motion are exact.
+        coarse: Degree at which products of a property and a motion are, and outputs.
         of_slider: Degree of the slider's force in each input.
         place: Number of the yielding storey.
         follow: w, accelerations of the floors under a unit of each load, shape (L, N).
@@ -78,6 +79,7 @@ class BoxModel:
     inputs: int
     degree: int
     fine: int
+    coarse: int
     of_slider: int
     place: int
     follow: Array
@@ -86,6 +88,13 @@ class BoxModel:
     low: Properties[Array]
     high: Properties[Array]
     missed: Properties[Array]
+
+    @cached_property
+    def fixed(self) -> BoxModel:
+        """The same on the coarse grid, for elements whose length is the same at all inputs."""
+        degrees = self.fine, self.coarse
+        values = (along_inputs(x, self.inputs, refining_matrix, *degrees) for x in self.grid)
+        return replace(self, fine=self.coarse, grid=Properties(*values))
 
     @property
     def parts(self) -> int:
@@ -111,7 +120,7 @@ class BoxModel:
 
     def refined(self, values: Array) -> Array:
         """Return what interpolates values at the parameter sets of the motions, on the grid."""
-        return along_inputs(refining_matrix(self.degree, self.fine), values, self.inputs)
+        return along_inputs(values, self.inputs, refining_matrix, self.degree, self.fine)
 
     def magnitude(self, values: Array) -> Array:
         """Bound the magnitudes of polynomials on the grid over the box, shape (…)."""
@@ -281,10 +290,8 @@ def interpolate(
         rate = np.zeros_like(fit)
         rate[:, :, :-1] = fit[:, :, 1:] * np.arange(1, LOAD_TERMS) / span[:, 1, None, None]
         fit = np.concatenate([fit, rate], axis=1)
-    loads, missed = _loads_over_inputs(model, begin, length, span, fit)
+    loads, missed, variation = _loads_over_inputs(model, begin, length, span, fit)
     fit_error = elements.fit_error[chosen]
-    variation = np.arange(LOAD_TERMS) @ missed[:, :, :n_loads]
-    missed = missed.sum(axis=1)
 
     n = len(model.follow[0])
     terms = max(int(elements.terms.max(initial=0)), LOAD_TERMS)
@@ -305,7 +312,7 @@ def interpolate(
         constant=model.refined(elements.constant[chosen]),
         path=model.refined(elements.path[chosen]),
         load_error=fit_error[..., 0] + missed[:, :n_loads],
-        load_variation=fit_error[..., 1] * max_length[:, np.newaxis] + variation,
+        load_variation=fit_error[..., 1] * max_length[:, np.newaxis] + variation[:, :n_loads],
         load_rate=model.refined(loads[:, :, n_loads:]) if with_rates else loads[:, :, n_loads:],
         rate_error=fit_error[..., 1] + missed[:, -n_loads:],
         max_relative=model.largest(relative),
@@ -315,13 +322,13 @@ def interpolate(
 
 def _loads_over_inputs(
     model: BoxModel, begin: Array, length: Array, span: Array, fit: Array
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
     """Return loads at the parameter sets, and bounds of what interpolation over inputs misses.
 
     At the inputs u and the fraction τ an element has the time t = t_0(u) + τ h(u), and the load is
     a polynomial of t. So it is one of τ and u, of the degree 7 n in each input with the degree n of
-    the interpolation. Its Chebyshev coefficients less those of the interpolant bound the
-    difference.
+    the interpolation. Its Chebyshev coefficients less those of its interpolant bound the
+    difference, in the Bernstein form in τ.
 
     Args:
         model: The frame over the box.
@@ -331,21 +338,25 @@ def _loads_over_inputs(
         fit: Powers of (t − midpoint) / radius, shape (e, L, LOAD_TERMS).
 
     Returns:
-        Powers of τ, shape (e, LOAD_TERMS, L, J), and bounds of the difference by them, without J.
+        Powers of τ, shape (e, LOAD_TERMS, L, J), and bounds of the difference and of its derivative
+        by τ, shape (e, L).
     """
     at_zero = (begin - span[:, :1]) / span[:, 1:]
     slope = length / span[:, 1:]
     loads = _composed_elements(fit, at_zero, slope)
-    missed = np.zeros(loads.shape[:3])
+    missed, variation = np.zeros((2, *fit.shape[:2]))
     varies = np.flatnonzero((np.ptp(begin, axis=1) > 0) | (np.ptp(length, axis=1) > 0))
     if len(varies):
         degree = (LOAD_TERMS - 1) * model.degree
-        refine = refining_matrix(model.degree, degree)
-        finer = along_inputs(refine, np.stack([at_zero[varies], slope[varies]]), model.inputs)
+        how = model.inputs, refining_matrix, model.degree, degree
+        finer = along_inputs(np.stack([at_zero[varies], slope[varies]]), *how)
         exact = _composed_elements(fit[varies], finer[0], finer[1])
-        exact -= along_inputs(refine, loads[varies], model.inputs)
-        missed[varies] = magnitude(exact, model.inputs, degree)
-    return loads, missed
+        exact -= along_inputs(loads[varies], *how)
+        exact = np.asarray(np.tensordot(bernstein_matrix(LOAD_TERMS - 1), exact, (1, 1)), float)
+        missed[varies] = magnitude(exact, model.inputs, degree).max(axis=0)
+        rate = magnitude(np.diff(exact, axis=0), model.inputs, degree).max(axis=0)
+        variation[varies] = (LOAD_TERMS - 1) * rate
+    return loads, missed, variation
 
 
 def _composed_elements(fit: Array, at_zero: Array, slope: Array) -> Array:

@@ -14,7 +14,11 @@ from scipy.special import comb
 from alphacut.base.arrays import Array, Ints
 from alphacut.frame.bounds.interpolated_defects import Interpolant
 from alphacut.frame.bounds.interpolated_motions import LOAD_TERMS
-from alphacut.frame.calculus.interpolation import bernstein_matrix
+from alphacut.frame.calculus.interpolation import (
+    along_inputs,
+    bernstein_matrix,
+    refining_matrix,
+)
 
 # Parts of an element's time on which peaks are bounded where they matter (tuned: the bound of a
 # polynomial of the degree 12 by its Bernstein coefficients is then within 1e-4 of its peak).
@@ -26,7 +30,7 @@ class OutputRows:
     """m outputs as sums of 2N + 2 components, and how errors of the motion enter.
 
     Args:
-        factors: Factors of the components on the grid, shape (m, components, F).
+        factors: Factors of the components on the coarse grid, shape (m, components, F).
         remainder: What these miss, shape (m, components).
         magnitude: Bounds of the factors, shape (m, components).
         by_norm: Error of each output for S = 1, shape (m,).
@@ -63,7 +67,7 @@ def output_series(found: Interpolant, rows: OutputRows, slider_level: Array) -> 
     """
     model = found.model
     missed_drifts = found.load_error @ model.following_drifts
-    velocity = np.zeros_like(found.relative)
+    velocity = found.drifts  # no matter if no output uses velocities
     missed_velocity = found.velocity_error
     if rows.uses_rates:
         velocity = found.absolute_velocity.copy()
@@ -71,16 +75,21 @@ def output_series(found: Interpolant, rows: OutputRows, slider_level: Array) -> 
         missed_velocity = missed_velocity + found.rate_error @ np.abs(model.follow)
     path = found.phase[:, np.newaxis, np.newaxis] * found.drift
     path[:, 0] += found.path
-    scalars = np.stack([found.slider_force, path], axis=2)
-    components = np.concatenate([found.drifts, velocity, scalars], axis=2)
+    of_floors = [np.moveaxis(x, 2, 0) for x in (found.drifts, velocity)]
+    components = [*of_floors[0], *of_floors[1], found.slider_force, path]
     missed = np.column_stack(
         [missed_drifts, missed_velocity, slider_level, missed_drifts[:, model.place]]
     )
-    values = np.zeros((*components.shape[:2], len(rows.factors), components.shape[3]))
+    degrees = model.coarse, model.fine
+    factors = along_inputs(rows.factors, model.inputs, refining_matrix, *degrees)
+    values = np.zeros((*path.shape[:2], len(factors), path.shape[2]))
     for row, column in np.argwhere(rows.magnitude):
-        values[:, :, row] += rows.factors[row, column] * components[:, :, column]
+        values[:, :, row] += factors[row, column] * components[column]
     # The grid of the degree has a Lebesgue constant below 3 in each input (degrees up to 20).
-    largest = 3.0**model.inputs * np.abs(components).max(axis=-1).sum(axis=1)
+    largest = np.zeros_like(missed)
+    for column in np.flatnonzero(rows.remainder.any(axis=0)):
+        peaks = np.abs(components[column]).max(axis=-1)
+        largest[:, column] = 3.0**model.inputs * peaks.sum(axis=1)
     return values, missed @ rows.magnitude.T + (largest + missed) @ rows.remainder.T
 
 

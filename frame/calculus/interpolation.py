@@ -9,6 +9,7 @@ more closely (Farouki 2012).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from itertools import product
 from math import comb
@@ -17,6 +18,9 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
 from alphacut.base.arrays import Array
+
+LARGEST_PRODUCT = 2**18
+"""Most entries of a matrix for all inputs at once, which is faster up to there (tuned)."""
 
 
 @cache
@@ -97,19 +101,34 @@ def part_matrix(degree: int, kept: int, parts: int) -> Array:
     return np.concatenate(rows)
 
 
-def along_inputs(matrix: Array, values: Array, inputs: int) -> Array:
+@cache
+def _whole(make: Callable[..., Array], inputs: int, *arguments: int) -> Array:
+    """Return the matrix for all inputs at once, of one for each."""
+    whole: Array = np.ones((1, 1))
+    for _ in range(inputs):
+        whole = np.asarray(np.kron(whole, make(*arguments)), float)
+    return whole
+
+
+def along_inputs(values: Array, inputs: int, make: Callable[..., Array], *arguments: int) -> Array:
     """Apply a matrix along each input of arrays over a grid.
 
     Args:
-        matrix: Shape (rows, n).
         values: Shape (…, n^inputs).
         inputs: Number of inputs.
+        make: Function that returns the matrix, shape (rows, n).
+        arguments: Its arguments.
 
     Returns:
         Shape (…, rows^inputs).
     """
+    matrix = make(*arguments)
     rows, n = matrix.shape
     head = values.shape[:-1]
+    if matrix.size**inputs <= LARGEST_PRODUCT:
+        whole = _whole(make, inputs, *arguments)
+        found = values.reshape(-1, values.shape[-1]) @ whole.T
+        return np.asarray(found.reshape(*head, len(whole)))
     # The first input of the grid is moved behind the others, once for each input.
     for _ in range(inputs):
         rest = values.reshape(-1, n, values.shape[-1] // n)
@@ -120,7 +139,7 @@ def along_inputs(matrix: Array, values: Array, inputs: int) -> Array:
 
 def coefficients(values: Array, inputs: int, degree: int) -> Array:
     """Return the Chebyshev coefficients of polynomials on a grid; the first one is the constant."""
-    return along_inputs(chebyshev_matrix(degree), values, inputs)
+    return along_inputs(values, inputs, chebyshev_matrix, degree)
 
 
 def magnitude(values: Array, inputs: int, degree: int) -> Array:
@@ -155,7 +174,7 @@ def part_maxima(
     head = values.shape[:-1]
     if not values.size:
         return np.zeros((*head, parts**inputs))
-    found = along_inputs(part_matrix(degree, kept, parts), values, inputs)
+    found = along_inputs(values, inputs, part_matrix, degree, kept, parts)
     for _ in range(inputs):
         # the last input's coefficients are reduced, and its parts moved to the front
         found = found.reshape(*head, -1, parts, kept + 1)
