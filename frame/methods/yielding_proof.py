@@ -35,7 +35,7 @@ MIN_WIDTH = 2.0**-14
 """Width of a sub-box, as a fraction of that of the whole, at which further ones do not help."""
 MAX_INPUTS = 3
 """Most inputs with a width: the number of sub-boxes grows as a power of theirs."""
-ROOM = 1.0
+ROOM = 1.5
 """Fraction of the wanted gap that may be spent on events that are left out (tuned)."""
 ROOM_TO_LIMIT = 1.5
 """The same of the distance of peaks from a limit (tuned: in the mean over the box, on whose parts
