@@ -494,9 +494,11 @@ def geometric_mean(mass: TaylorModel, stiffness: TaylorModel, omega: Array) -> T
         # rounds are ended early, and nothing rests on this.
         if not (found < sums).all():
             break
-        if (1.001 * found <= bound).all():
+        holds = 1.001 * found <= bound
+        if holds.all():
             return series.widened(bound)
-        bound = 1.02 * np.maximum(found, bound)
+        # What holds stays: an entry that follows others would never come up with them.
+        bound = np.where(holds, bound, 1.02 * np.maximum(found, bound))
     what = "the box is so wide that the damping by a ratio is not enclosed"
     raise UnprovedError(what, "take narrower inputs")
 

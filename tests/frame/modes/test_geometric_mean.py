@@ -68,6 +68,19 @@ def test_the_remainder_of_one_unknown_is_that_of_its_square_root(rng):
     assert missed <= found.remainder[0, 0] <= 1.5 * missed
 
 
+def test_a_crisp_mean_is_enclosed_where_one_entry_follows_the_others(rng):
+    """An entry without a defect of its own has one by products of the others' bounds alone."""
+    omega = np.sort(rng.uniform(1, 30, 3))
+    missed = np.full((3, 3), 1e-14)
+    missed[2, 2] = 0.0
+    mass, stiffness = (
+        TaylorModel((np.diag(x)[None], np.zeros((1, 3, 3))), missed * x.max(), inputs=1, order=1)
+        for x in (np.ones(3), omega**2)
+    )
+    found = geometric_mean(mass, stiffness, omega)
+    assert found.remainder.max() < 1e-10 * omega[-1]
+
+
 def test_a_box_of_which_no_mean_is_enclosed_is_refused(rng):
     stiffness = varying(rng, np.array([1.0, 1.1]), width=1.0, order=2)
     stiffness = stiffness + stiffness.like(np.diag([0.0, 0.0])).widened(np.full((2, 2), 0.9))
