@@ -2,6 +2,7 @@
 
 import time
 
+import numba
 import numpy as np
 import pytest
 
@@ -32,6 +33,7 @@ def test_a_line_says_that_a_kernel_is_compiled(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr("alphacut.base.progress_bar.monotonic", lambda: next(times))
     monkeypatch.setattr("alphacut.base.progress_bar.REPEAT", 1e3)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))  # read as it is imported
     shared_folder.cache_clear()  # another test may have asked for the user's
     _twice.__module__ = "alphacut.base.kernels"  # whose text is part of the name in the cache
     twice = kernel()(_twice)
