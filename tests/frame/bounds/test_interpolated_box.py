@@ -1,14 +1,22 @@
 """Boxes of frames with one yielding storey: motions stay inside, and the bounds are close."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.polynomial import Polynomial
 from numpy.polynomial.chebyshev import chebvander
 
 from alphacut.frame import Accelerogram, StoreyFrame
 from alphacut.frame.bounds.interpolated_box import InterpolatedFrame, _start_error
-from alphacut.frame.bounds.interpolated_defects import _elastic_violations, defects, interpolate
+from alphacut.frame.bounds.interpolated_defects import (
+    BoxModel,
+    _elastic_violations,
+    _loads_over_inputs,
+    defects,
+    interpolate,
+)
 from alphacut.frame.calculus.interpolation import chebyshev_matrix, grid
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.yielding import YieldingFlow
@@ -173,6 +181,42 @@ def test_what_kinematics_miss_is_below_its_bound(rng):
             missing = np.abs(speed - (found.length @ y) * momentum / frame.masses[0])
             true = weights @ missing / 2
             assert (true <= missed + 1e-14 * np.abs(speed).max()).all()
+
+
+def test_what_interpolated_loads_miss_is_below_its_bound(rng):
+    nodes = grid(1, 3)[:, 0]
+    begin, length = 0.3 * nodes, 0.4 + 0.1 * nodes
+    load = Polynomial(rng.normal(size=8))
+    span, model = np.array([[0.0, 1.0]]), SimpleNamespace(inputs=1, degree=3)
+    series, missed, variation = _loads_over_inputs(
+        model, begin[np.newaxis], length[np.newaxis], span, load.coef[np.newaxis, np.newaxis]
+    )
+    inputs, fractions = np.linspace(-1, 1, 201), np.linspace(0, 1, 101)
+    of_nodes = chebvander(inputs, 3) @ chebyshev_matrix(3)
+    off, change = [], []
+    for start, extent, powers in zip(
+        of_nodes @ begin, of_nodes @ length, of_nodes @ series[0, :, 0].T, strict=True
+    ):
+        found, time = Polynomial(powers), start + fractions * extent
+        off.append(np.abs(load(time) - found(fractions)).max())
+        change.append(np.abs(extent * load.deriv()(time) - found.deriv()(fractions)).max())
+    assert max(off) <= missed[0, 0] <= 10 * max(off)
+    assert max(change) <= variation[0, 0] <= 20 * max(change)
+
+
+@pytest.mark.parametrize("names", [("k1",), ("k1", "fy1")])
+def test_bounds_on_the_coarse_grid_are_those_on_the_fine_one(names, monkeypatch):
+    """Most elements have one length at all inputs; their polynomials are exact on either grid."""
+    coarse, *_ = compared(
+        isolated_building(np.random.default_rng(1), 1), names, 2e-3, np.random.default_rng(2)
+    )
+    monkeypatch.setattr(BoxModel, "fixed", property(lambda model: model))
+    fine, *_ = compared(
+        isolated_building(np.random.default_rng(1), 1), names, 2e-3, np.random.default_rng(2)
+    )
+    assert np.isfinite(fine.peaks).all()
+    assert coarse.peaks == pytest.approx(fine.peaks, rel=1e-9)
+    assert coarse.upper == pytest.approx(fine.upper, rel=1e-9, abs=1e-12 * fine.upper.max())
 
 
 def test_an_event_behind_the_end_of_only_some_motions_does_not_count(rng):
