@@ -208,11 +208,11 @@ def test_what_interpolated_loads_miss_is_below_its_bound(rng):
 def test_bounds_on_the_coarse_grid_are_those_on_the_fine_one(names, monkeypatch):
     """Most elements have one length at all inputs; their polynomials are exact on either grid."""
     coarse, *_ = compared(
-        isolated_building(np.random.default_rng(1), 1), names, 2e-3, np.random.default_rng(2)
+        isolated_building(np.random.default_rng(1), 1), names, 0.04, np.random.default_rng(2)
     )
     monkeypatch.setattr(BoxModel, "fixed", property(lambda model: model))
     fine, *_ = compared(
-        isolated_building(np.random.default_rng(1), 1), names, 2e-3, np.random.default_rng(2)
+        isolated_building(np.random.default_rng(1), 1), names, 0.04, np.random.default_rng(2)
     )
     assert np.isfinite(fine.peaks).all()
     assert coarse.peaks == pytest.approx(fine.peaks, rel=1e-9)
