@@ -66,7 +66,7 @@ def read_grid(path: Path | str, theta: tuple[float, float] = (0.0, 1.0)) -> Pris
         raise
     except RefusedError as error:
         cure = error.cure or "write it anew by Gmsh"
-        raise RefusedError("mesh.file", f"{path}, {error.value}", MESH_FILES, cure) from None
+        raise RefusedError("mesh.file", f"{error.value}, of {path}", MESH_FILES, cure) from None
     is_plane = mesh.dimension == SURFACE
     for comment in re.findall(rb"(?s)\$Comments(.*?)\$EndComments", content):
         text = comment.decode("utf-8", "replace")
@@ -125,7 +125,7 @@ def mesh_content(path: Path | str) -> bytes:
         rest = rest.lstrip()
     is_mesh = re.match(rb"\$MeshFormat\s", rest) is not None
     cure = 'write it by gmsh.write("NAME.msh") or `gmsh -save`; a .geo script is no mesh'
-    require(is_mesh, "mesh.file", f"{path}, without $MeshFormat at its start", MESH_FILES, cure)
+    require(is_mesh, "mesh.file", f"without $MeshFormat at its start, {path}", MESH_FILES, cure)
     return content
 
 

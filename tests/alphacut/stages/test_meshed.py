@@ -138,7 +138,9 @@ def test_an_exported_cell_taken_as_the_mesh_has_the_same_modulus(tmp_path):
     ],
 )
 def test_what_does_not_fit_is_refused_in_one_line(tmp_path, capfd, command, old, new, message):
-    case = prepared(tmp_path, "mesh", {old: new})
+    folder = tmp_path / ("folder " * 30)  # what is wrong is told before a long path
+    folder.mkdir()
+    case = prepared(folder, "mesh", {old: new})
     out = [f"--out={tmp_path}/out"] if command == "run" else []
     assert main([command, str(case), *out]) == 2
     said = capfd.readouterr().err
