@@ -60,9 +60,8 @@ ROUNDING = 1e-9
 EXTRA_INTERVALS = 60
 # Elements of one march at most, for each interval of the loads and each substep between samples.
 MAX_ELEMENTS = 8
-# Norm S, as a multiple of the largest room for events that are left out, at which a box is given up
-# as too wide, and the part of this room that an element may take without a closer look (tuned).
-GIVE_UP = 10.0
+# Part of the least room for events that are left out that an element may take without a closer
+# look (tuned).
 SMALL_VIOLATION = 1e-4
 # Length of an element that begins and ends at fixed times, as a fraction of the largest one, and
 # the same where much may be left out (tuned: the polynomial of the load misses little of intervals
@@ -77,24 +76,11 @@ MAX_MOVED = 3.0
 # Parts of an element's time on which the side of the slider's force is sought (tuned).
 SIDE_PARTS = 8
 SMALL_EVENT = 1e-8
+# Changes of this side that a plan reckons with (tuned).
+SIDE_CHANGES = 20
 # Largest difference of the times of an event at the parameter sets of a box, as a fraction of the
 # elastic period (tuned: far below the time between two events with one side).
 WINDOW = 0.25
-
-
-@dataclass(frozen=True, eq=False)
-class PeakHistory:
-    """Peaks of interpolated motions over time, and what errors add to them.
-
-    Args:
-        begin: Begin of each element, shape (e,), in s.
-        peaks: Largest magnitude of each output on it, shape (e, m).
-        by_norm: Error of each output for S = 1, shape (m,).
-    """
-
-    begin: Array
-    peaks: Array
-    by_norm: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,15 +92,12 @@ class BoxBounds:
         steps: The same over the step before each node, shape (T, m, 2).
         peaks: The same over all times, shape (m, 2).
         error: Bound of the energy norm S of the error at the end, in J^½.
-        history: What is known of the motions for a plan of narrower boxes; None if the box is too
-            wide.
     """
 
     upper: Array
     steps: Array
     peaks: Array
     error: float
-    history: PeakHistory | None = None
 
 
 class _Swept(NamedTuple):
@@ -202,23 +185,47 @@ class InterpolatedFrame:
         powers = PPoly(np.stack([slope, first]), edges).antiderivative(2).c[::-1]
         return LoadIntegrals(edges, np.ascontiguousarray(np.moveaxis(powers, 0, -1))), last
 
-    def bounds(self, low: Array, high: Array, room: Array | None = None) -> BoxBounds:
+    def bounds(self, low: Array, high: Array, allowed: Array | None = None) -> BoxBounds:
         """Return guaranteed bounds of the outputs over a box of the inputs.
 
         Args:
             low: Lower ends of all inputs of the flow, in SI units, shape (d,).
             high: Upper ends; those of inputs that are not active must be equal.
-            room: How large S may become by events that are left out, in J^½, from each interval of
-                the loads on, shape (E,); none by default. It guides the proof, and proves nothing.
+            allowed: By how much events that are left out may widen each output from each time node
+                on, shape (T, m); as much as they do by default. It guides the proof, and proves
+                nothing.
 
         Raises:
             UnprovedError: A quantity that must be positive is not known to be so over the box.
         """
         model, rows = self._model(low, high)
+        room = None if allowed is None else self._room(model, rows, allowed)
         elements = self._motions(model, room)
         if elements is None:
             return self.infinite
         return self._sweep(model, rows, elements, room) or self.infinite
+
+    def _room(self, model: BoxModel, rows: OutputRows, allowed: Array) -> Array:
+        """Return how large S may become from each interval of the loads on, shape (E,), in J^½.
+
+        Args:
+            model: The frame over the box.
+            rows: Its outputs.
+            allowed: See `bounds`.
+        """
+        end = self.flow.time[-1]
+        # The error of a drift without hardening is bounded by the integral of S alone, and that of
+        # the plastic path by changes of side.
+        by_drift = rows.of_drift * model.direction_norm * end + rows.without_drift
+        soft = np.sqrt(max(model.low.stiffness[model.place], 1e-300))
+        plastic = min(1 / soft, model.direction_norm * end) + 2 / np.sqrt(model.low.slider)
+        by_norm = np.minimum(rows.by_norm, by_drift)
+        by_norm += rows.magnitude[:, -1] * 2 * SIDE_CHANGES * plastic
+        # Outputs that stay at rest, on which S has no influence, do not count.
+        room = (allowed / np.where(by_norm > 0, by_norm, 1e-300)).min(axis=1)
+        least_drift = (model.at_sets.force / model.at_sets.slider).min()
+        room = np.minimum(room, MAX_MOVED * least_drift * np.sqrt(model.high.slider))
+        return np.asarray(np.interp(self.loads[0].edges[:-1], self.flow.time, room))
 
     @property
     def infinite(self) -> BoxBounds:
@@ -439,7 +446,6 @@ class InterpolatedFrame:
         self, model: BoxModel, rows: OutputRows, elements: Elements, room: Array | None
     ) -> BoxBounds | None:
         """Return bounds by what interpolated motions miss, or None where they go too far astray."""
-        give_up = np.inf if room is None else GIVE_UP * float(room.max())
         small = 0.0 if room is None else SMALL_VIOLATION * float(room.min())
         varies = np.ptp(elements.length, axis=1) > 0
         groups: list[tuple[BoxModel, Ints]] = []
@@ -450,16 +456,12 @@ class InterpolatedFrame:
             groups += [(of_group, numbers[first : first + size]) for first in starts]
         of_path = rows.magnitude[:, -1]
         start = _start_error(model, elements)
-        norm = np.full(model.parts**model.inputs, start)
         swept = []
         for of_group, chosen in groups:
             found = interpolate(of_group, elements, chosen, with_rates=rows.uses_rates)
             if found is None:
                 return None
             missed = defects(found, small)
-            norm = norm + missed.growth.sum() + missed.violation.sum(axis=0)
-            if norm.min() > give_up:
-                return None
             values, error = output_series(found, rows, missed.level)
             reached = values.sum(axis=1)
             at_end = np.stack([-reached, reached], axis=-1).max(axis=2)
@@ -523,16 +525,7 @@ class InterpolatedFrame:
         for values in (*at_nodes, peaks):
             values += widening
             self._limit_residual(model, values)
-        # The error of a drift without hardening is bounded by the integral of S alone, and that of
-        # the plastic path by changes of side.
-        end = self.flow.time[-1]
-        by_norm = rows.of_drift * model.direction_norm * end + rows.without_drift
-        history = PeakHistory(
-            begin=elements.begin.mean(axis=1),
-            peaks=done.at_end.max(axis=-1),
-            by_norm=np.minimum(rows.by_norm, by_norm) + of_path * path[-1] / max(most[-1], 1e-300),
-        )
-        return BoxBounds(at_nodes[0], at_nodes[1], peaks, float(most[-1]), history)
+        return BoxBounds(at_nodes[0], at_nodes[1], peaks, float(most[-1]))
 
     def _row(
         self, p: Mapping[str, TaylorModel], found: Properties[TaylorModel], output: str

@@ -36,12 +36,11 @@ MIN_WIDTH = 2.0**-14
 MAX_INPUTS = 3
 """Most inputs with a width: the number of sub-boxes grows as a power of theirs."""
 ROOM = 1.5
-"""Fraction of the wanted gap that may be spent on events that are left out (tuned)."""
+"""Fraction of the distance of motions below the attained peak and the wanted gap that may be spent
+on events that are left out (tuned)."""
 ROOM_TO_LIMIT = 1.5
 """The same of the distance of peaks from a limit (tuned: in the mean over the box, on whose parts
 it counts, what is left out costs about a third of its largest cost)."""
-ROOM_BEFORE = 0.7
-"""Fraction of the distance of what follows below the peak that may be spent so (tuned)."""
 SHOWN_RANGES = 3
 """Number of open sub-boxes that a message names."""
 
@@ -84,7 +83,7 @@ def prove_yielding(
     influence = _influence(yielding_flow, boxes)
     levels: list[_Search] = []
     for row, tick in boxes.inside_out(progress):
-        search = _Search(frame, influence, boxes, row, gap, thresholds)
+        search = _Search(frame, boxes, row, gap, thresholds)
         if levels:  # a wider box contains what the narrower one attains
             search.take_over(levels[-1])
         search.run(budget, tick)
@@ -151,11 +150,15 @@ class _SubBox:
         return np.asarray((-self.upper[0, :, :, ::-1]).max(axis=0))
 
 
+_Open = tuple[float, int, _SubBox, Array, int]
+"""Key and number of an open sub-box, it, and what `_Search._explore` found of it."""
+
+
 class _Search:
     """Branch and bound of the peaks on one level.
 
     A sub-box is closed when it says all that is asked (`is_closed`), else it is bisected along the
-    input that moves the response most over it.
+    input that moves the outputs most over it.
 
     Attributes:
         upper: Guaranteed bounds over closed sub-boxes, at nodes and over steps, (2, T, m, 2).
@@ -175,17 +178,15 @@ class _Search:
     def __init__(
         self,
         frame: InterpolatedFrame,
-        influence: Array,
         boxes: Boxes,
         row: int,
         gap: Array,
         thresholds: Sequence[Threshold],
     ) -> None:
-        """Begin with the nominal trajectory and those at corners and centre of the box of a level.
+        """Begin with the nominal trajectory.
 
         Args:
             frame: The frame.
-            influence: By how much each input moves the response, shape (d,).
             boxes: The boxes of all levels.
             row: Which level.
             gap: Wanted gap of the peak of each output, in its unit, shape (m,).
@@ -193,7 +194,6 @@ class _Search:
         """
         self.gap = np.maximum(gap, 1e-300)
         self.frame = frame
-        self.influence = influence
         self.low = low = boxes.lower[row]
         self.high = high = boxes.upper[row]
         self.width = np.where(high > low, high - low, 1.0)
@@ -219,7 +219,7 @@ class _Search:
         self.trajectories = 0
         self.open: list[_SubBox] = []
         self.finite_peaks = np.full((m, 2), -np.inf)
-        self.attain(np.vstack([boxes.nominal, _probes(low, high)]))
+        self.attain(boxes.nominal[np.newaxis])
 
     def take_over(self, narrower: _Search) -> None:
         """Take over, in place, what trajectories of a narrower level attain."""
@@ -245,31 +245,26 @@ class _Search:
         Raises:
             UnprovedError: A quantity that must be positive may not be so over any sub-box.
         """
-        self.room = self._room()
         # Sub-boxes that have no bounds come first, the widest ones before others, and then those
         # that are farthest from an answer.
-        heap: list[tuple[float, int, _SubBox]] = []
-        self._add(heap, self._bounded(self.low, self.high, None))
+        heap: list[_Open] = []
+        self._add(heap, self._bounded(self.low, self.high, self._explore(self.low, self.high)[0]))
         while heap and self.count < budget:
-            _, _, box = heappop(heap)
+            _, _, box, later, axis = heappop(heap)
             if self.is_closed(box):  # as attained values have risen since
                 self._close(box)
                 continue
-            axis = int((self.influence * (box.high - box.low) / self.width).argmax())
-            middle = (box.low[axis] + box.high[axis]) / 2
             if box.high[axis] - box.low[axis] < MIN_WIDTH * self.width[axis]:
                 self.open.append(box)
                 continue
+            middle = (box.low[axis] + box.high[axis]) / 2
             for is_above in (False, True):
                 low = box.low.copy()
                 high = box.high.copy()
-                if is_above:
-                    low[axis] = middle
-                else:
-                    high[axis] = middle
-                self._add(heap, self._bounded(low, high, box))
+                (low if is_above else high)[axis] = middle
+                self._add(heap, self._bounded(low, high, later, box))
             progress(self.count / budget)
-        self.open += [box for _, _, box in heap]
+        self.open += [x[2] for x in heap]
 
     def is_closed(self, box: _SubBox) -> bool:
         """Return whether a sub-box says all that is asked.
@@ -326,39 +321,48 @@ class _Search:
         within = "within " if len(self.open) > SHOWN_RANGES else ""
         return within + "; ".join(texts)
 
-    def _room(self) -> Array | None:
-        """Return how large S may become by events that are left out, (E,), or None if unknown.
+    def _allowed(self, later: Array) -> Array | None:
+        """Return by how much left-out events may widen outputs over a sub-box, (T, m); None if any.
 
-        Before the time of a peak it is a fraction of the wanted gap, or of the distance to the
-        threshold; behind it a fraction of the distance of what follows below the peak.
+        It is a fraction of the distance to the wanted gap above the attained peak, or to the limit.
+
+        Args:
+            later: Largest magnitudes in the sub-box from each time node on, shape (T, m).
         """
+        to_gap = ROOM * (self.gap + np.maximum(self.peak - later, 0.0))
+        to_gap[:, later[0] == 0] = np.inf  # what stays at rest
+        if not self.is_to_limits:
+            return np.asarray(to_gap)
         left = self._left()
-        if self.is_to_limits and not left:
-            return None
-        history = self.frame.bounds(*_centre(self.low, self.high)).history
-        if history is None:
-            return None
-        later = np.maximum.accumulate(history.peaks[::-1], axis=0)[::-1]
-        allowed = np.maximum(ROOM * self.gap, ROOM * ROOM_BEFORE * (later[0] - later))
-        if self.is_to_limits:
-            to_gap = allowed
-            allowed = np.full_like(later, np.inf)
-            for column, threshold in left:
-                of_column = to_gap[:, column]
-                if threshold.value is not None:
-                    of_column = ROOM_TO_LIMIT * np.abs(threshold.value - later[:, column])
-                allowed[:, column] = np.minimum(allowed[:, column], of_column)
-        # Outputs that stay at rest, on which S has no influence, do not count.
-        by_norm = np.where(history.by_norm > 0, history.by_norm, 1e-300)
-        room = (allowed / by_norm).min(axis=1)
-        edges = self.frame.loads[0].edges
-        return np.asarray(np.interp(edges[:-1], history.begin, room))
+        allowed = np.full_like(later, np.inf)
+        for column, threshold in left:
+            of_column = to_gap[:, column]
+            if threshold.value is not None:
+                of_column = ROOM_TO_LIMIT * np.abs(threshold.value - later[:, column])
+            allowed[:, column] = np.minimum(allowed[:, column], of_column)
+        return allowed if left else None
 
-    def _bounded(self, low: Array, high: Array, parent: _SubBox | None) -> _SubBox:
+    def _explore(self, low: Array, high: Array) -> tuple[Array, int]:
+        """Attain the motions at midpoint and corners of a sub-box.
+
+        Returns:
+            Largest magnitudes of each output from each time node on, shape (T, m), and the input
+            that moves the outputs most over the sub-box.
+        """
+        points = _probes(low, high)
+        values = self.attain(points)
+        later = np.maximum.accumulate(np.abs(values).max(axis=0)[::-1])[::-1]
+        sides = np.sign(points - (low + high) / 2)
+        moved = np.abs(np.tensordot(sides, values, (0, 0))).max(axis=1)
+        return later, int((moved / np.maximum(later[0], 1e-300)).sum(axis=1).argmax())
+
+    def _bounded(
+        self, low: Array, high: Array, later: Array, parent: _SubBox | None = None
+    ) -> _SubBox:
         """Return a sub-box with its bounds, which are at most those of its parent."""
         self.count += 1
         try:
-            found = self.frame.bounds(low, high, self.room)
+            found = self.frame.bounds(low, high, self._allowed(later))
         except UnprovedError:  # what must be positive may be so on narrower boxes
             found = self.frame.infinite
         upper = np.stack([found.upper, found.steps])
@@ -368,14 +372,14 @@ class _Search:
             peaks = np.minimum(peaks, parent.peaks)
         return _SubBox(low, high, upper, peaks)
 
-    def _add(self, heap: list[tuple[float, int, _SubBox]], box: _SubBox) -> None:
+    def _add(self, heap: list[_Open], box: _SubBox) -> None:
         """Close a sub-box if its bounds suffice, and else add it to the heap."""
         if not self.is_closed(box):
-            self.attain(_probes(box.low, box.high))
+            explored = self._explore(box.low, box.high)
         if self.is_closed(box):
             self._close(box)
         else:
-            heappush(heap, (-self._score(box), self.count, box))
+            heappush(heap, (-self._score(box), self.count, box, *explored))
 
     def _score(self, box: _SubBox) -> float:
         """Return how far a sub-box is from an answer: above 1 where it is open."""
@@ -416,8 +420,12 @@ class _Search:
         least = np.maximum(-box.upper[0], 0.0).max(axis=(0, 2))
         self.min_peak = np.minimum(self.min_peak, least)
 
-    def attain(self, points: Array) -> None:
-        """Raise attained values by the trajectories at points in SI units, shape (points, d)."""
+    def attain(self, points: Array) -> Array:
+        """Raise attained values by the trajectories at points in SI units, shape (points, d).
+
+        Returns:
+            The trajectories, shape (points, T, m).
+        """
         values, peaks = self.frame.flow.values_and_peaks(points)
         self.trajectories += len(points)
         # A trajectory is exact but for rounding, which the balance of its energy bounds.
@@ -441,6 +449,7 @@ class _Search:
             least, most = known_peaks(threshold, values[:, :, column], peaks[:, column])
             seen[0] = min(seen[0], most.min())
             seen[1] = max(seen[1], least.max())
+        return values
 
 
 def known_peaks(threshold: Threshold, values: Array, peaks: Array) -> Array:
@@ -458,13 +467,6 @@ def known_peaks(threshold: Threshold, values: Array, peaks: Array) -> Array:
     outwards = values if threshold.side else -values
     least = outwards.max(axis=1) - MAX_IMBALANCE * np.abs(values).max(axis=1)
     return np.stack([least, np.full(len(peaks), np.inf)])
-
-
-def _centre(low: Array, high: Array) -> tuple[Array, Array]:
-    """Return a box so narrow that it has one order of events, at the midpoint of a box."""
-    middle = (low + high) / 2
-    width = 1e-7 * (high - low)
-    return middle - width, middle + width
 
 
 def _probes(low: Array, high: Array) -> Array:

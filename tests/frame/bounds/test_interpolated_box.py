@@ -230,7 +230,7 @@ def test_an_event_behind_the_end_of_only_some_motions_does_not_count(rng):
     frame = replace(frame, yield_force=[float(k[0] * motion[peak]), 1e9])
     flow = YieldingFlow(frame, ("k1",), 0.01 * round(0.8 * peak), 0.01)
     box = InterpolatedFrame(flow, np.arange(1))
-    found = box.bounds(0.99 * k, 1.01 * k, np.full(len(box.loads[0].powers), 1e-9))
+    found = box.bounds(0.99 * k, 1.01 * k, np.full((len(flow.time), 1), 1e-9))
     assert found.error < 1e-3 * np.sqrt(k[0]) * motion[peak]
 
 
