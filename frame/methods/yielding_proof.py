@@ -347,13 +347,17 @@ class _Search:
 
         Returns:
             Largest magnitudes of each output from each time node on, shape (T, m), and the input
-            that moves the outputs most over the sub-box.
+            that moves the outputs most over the sub-box, in the sum over time.
         """
         points = _probes(low, high)
         values = self.attain(points)
         later = np.maximum.accumulate(np.abs(values).max(axis=0)[::-1])[::-1]
-        sides = np.sign(points - (low + high) / 2)
-        moved = np.abs(np.tensordot(sides, values, (0, 0))).max(axis=1)
+        # Points are in the order of their inputs, so that ends of edges are in one order, too.
+        above, below = points > (low + high) / 2, points < (low + high) / 2
+        moved = [
+            np.abs(values[x] - values[y]).sum(axis=(0, 1))
+            for x, y in zip(above.T, below.T, strict=True)
+        ]
         return later, int((moved / np.maximum(later[0], 1e-300)).sum(axis=1).argmax())
 
     def _bounded(
