@@ -216,8 +216,7 @@ class Interpolant:
     def absolute_velocity(self) -> Array:
         """M⁻¹ P − D q, shape (e, K, N, F), in m/s."""
         velocity = self.model.grid.inverse_mass * self.momentum
-        for i, j in np.argwhere(self.model.grid.decay.any(axis=-1)):
-            velocity[:, :, i] -= self.model.grid.decay[i, j] * self.relative[:, :, j]
+        velocity -= np.einsum("ijf,ekjf->ekif", self.model.grid.decay, self.relative)
         return velocity
 
     @cached_property

@@ -47,6 +47,9 @@ SHORT_ROOM = 0.2
 # What an event that is left out costs, as a multiple of how far the slider is moved, with what the
 # force that is missed meanwhile pushes (tuned).
 COST = 1.2
+# Largest length of an element that begins and ends at fixed times, as a multiple of that of others
+# (tuned: the Taylor series needs some more terms).
+CALM = 2.0
 # Time of an event that does not come, in s.
 NEVER = 1e30
 # Number of elements of a march that fails.
@@ -552,7 +555,9 @@ def march(
             new[:] = event_time
         span = new - t
         begin = t.copy()
-        parts = math.ceil(span.max() / longest - 1e-9)
+        # An element at an event misses more, as its load is that of several intervals.
+        most_of_part = longest if is_event or not is_fixed else CALM * longest
+        parts = math.ceil(span.max() / most_of_part - 1e-9)
         if new.max() >= until or span.min() <= 0 or element + parts >= len(out.phase):
             return NONE
         for part in range(parts):
