@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -92,12 +92,14 @@ class BoxBounds:
         steps: The same over the step before each node, shape (T, m, 2).
         peaks: The same over all times, shape (m, 2).
         error: Bound of the energy norm S of the error at the end, in J^½.
+        axis: Number of the input along which motions differ by an event; None if there is none.
     """
 
     upper: Array
     steps: Array
     peaks: Array
     error: float
+    axis: int | None = None
 
 
 class _Swept(NamedTuple):
@@ -200,9 +202,12 @@ class InterpolatedFrame:
         """
         model, rows = self._model(low, high)
         room = None if allowed is None else self._room(model, rows, allowed)
-        elements = self._motions(model, room)
+        elements, alone = self._motions(model, room)
         if elements is None:
-            return self.infinite
+            along = np.abs(alone @ grid(model.inputs, model.degree))
+            if not along.any():
+                return self.infinite
+            return replace(self.infinite, axis=int(self.active[along.argmax()]))
         return self._sweep(model, rows, elements, room) or self.infinite
 
     def _room(self, model: BoxModel, rows: OutputRows, allowed: Array) -> Array:
@@ -387,8 +392,11 @@ class InterpolatedFrame:
             degree=row_degrees,
         )
 
-    def _motions(self, model: BoxModel, room: Array | None) -> Elements | None:
-        """Return motions at parameter sets of the box, or None without a common order of events."""
+    def _motions(self, model: BoxModel, room: Array | None) -> tuple[Elements | None, Array]:
+        """Return motions at J parameter sets of the box, or None without a common order of events.
+
+        The array, of shape (J,), is 1 then where motions have an event that others do not have.
+        """
         at = model.at_sets
         z = model.place
         loads, last = self.loads
@@ -431,16 +439,18 @@ class InterpolatedFrame:
         momentum = at.mass * at.v0 + (at.damping * at.q0).sum(axis=1)
         start = np.concatenate([at.q0, momentum]).T.copy()
         window = WINDOW * 2 * np.pi / slowest
+        alone = np.empty(n_sets)
         spectral = np.ascontiguousarray(coefficients(np.eye(n_sets), model.inputs, model.degree).T)
         # What longer elements miss matters little beside much that may be left out.
         is_wide = room is not None and float(moved.min()) > least_drift / 2
         stride = max(int((LONG_STRIDE if is_wide else STRIDE) * longest / width), 1)
         count = march(
-            frames, loads, start, last, longest, window, moved, small, stride, spectral, elements
-        )
+            frames, loads, start, last, longest, window, moved, small, stride, spectral, elements,
+            alone,
+        )  # fmt: skip
         if count == NONE:
-            return None
-        return Elements._make(x[:count] for x in elements)
+            return None, alone
+        return Elements._make(x[:count] for x in elements), alone
 
     def _sweep(
         self, model: BoxModel, rows: OutputRows, elements: Elements, room: Array | None

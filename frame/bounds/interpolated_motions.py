@@ -469,7 +469,7 @@ def _mark_behind(loads: LoadIntegrals, t: float) -> int:
 @compiled
 def march(
     frames: Frames, loads: LoadIntegrals, start: Array, last: int, longest: float, window: float,
-    room: Array, small: float, stride: int, spectral: Array, out: Elements,
+    room: Array, small: float, stride: int, spectral: Array, out: Elements, alone: Array,
 ) -> int:  # fmt: skip
     """Write the motions of J frames with one order of events, and return the number of elements.
 
@@ -488,6 +488,8 @@ def march(
         stride: Intervals of the loads between two fixed times at which elements begin and end.
         spectral: Matrix from values at the parameter sets to Chebyshev coefficients, (J, J).
         out: Receives the elements.
+        alone: Receives 1 where motions have the event for which there is no common order, and 0 at
+            other parameter sets, shape (J,).
 
     Returns:
         The number of elements; `NONE` without a common order of events, or of too many elements.
@@ -502,6 +504,7 @@ def march(
     loads_at = np.empty((LOAD_TERMS, len(frames.follow), n_sets))
     phase = edge = element = 0
     spent = 0.0
+    alone[:] = 0.0
     is_fixed = True
     is_fresh = True  # whether the next event is not known
     interval = float(np.median(np.diff(loads.edges[: last + 1])))
@@ -541,6 +544,7 @@ def march(
             if chosen.all() and not (can_skip and most < allowed):
                 break
             if not can_skip:
+                alone[:] = chosen
                 return NONE
             spent += COST * most
         is_fresh = False

@@ -133,7 +133,8 @@ def _influence(flow: YieldingFlow, boxes: Boxes) -> Array:
 class _SubBox:
     """A sub-box with its bounds.
 
-    `low` and `high` are its ends in SI units, shape (d,). `upper` has the largest values of
+    `low` and `high` are its ends in SI units, shape (d,); `axis` is the number of the input along
+    which motions differ by an event, None if they do not. `upper` has the largest values of
     (−output, output) at time nodes and over the steps before them, shape (2, T, m, 2), and `peaks`
     the same over all times, shape (m, 2).
     """
@@ -142,6 +143,7 @@ class _SubBox:
     high: Array
     upper: Array
     peaks: Array
+    axis: int | None
 
     @property
     def least(self) -> Array:
@@ -158,7 +160,7 @@ class _Search:
     """Branch and bound of the peaks on one level.
 
     A sub-box is closed when it says all that is asked (`is_closed`), else it is bisected along the
-    input that moves the outputs most over it.
+    input along which motions differ by an event, or else that which moves the outputs most over it.
 
     Attributes:
         upper: Guaranteed bounds over closed sub-boxes, at nodes and over steps, (2, T, m, 2).
@@ -374,16 +376,18 @@ class _Search:
         if parent is not None:
             upper = np.minimum(upper, parent.upper)
             peaks = np.minimum(peaks, parent.peaks)
-        return _SubBox(low, high, upper, peaks)
+        return _SubBox(low, high, upper, peaks, found.axis)
 
     def _add(self, heap: list[_Open], box: _SubBox) -> None:
         """Close a sub-box if its bounds suffice, and else add it to the heap."""
         if not self.is_closed(box):
-            explored = self._explore(box.low, box.high)
+            later, axis = self._explore(box.low, box.high)
+            if box.axis is not None:
+                axis = box.axis
         if self.is_closed(box):
             self._close(box)
         else:
-            heappush(heap, (-self._score(box), self.count, box, *explored))
+            heappush(heap, (-self._score(box), self.count, box, later, axis))
 
     def _score(self, box: _SubBox) -> float:
         """Return how far a sub-box is from an answer: above 1 where it is open."""

@@ -108,7 +108,7 @@ def norms_and_bounds(frame, radius, inputs):
     box = InterpolatedFrame(flow, np.arange(1))
     k = frame.parameters["k1"] * (1 + radius * inputs)
     model, _ = box._model(*frame.parameters["k1"] * (1 + radius * np.array([[-1], [1]])))
-    elements = box._motions(model, None)
+    elements, _ = box._motions(model, None)
     if elements is None:  # the box is too wide for one order of events
         return np.zeros(1), np.zeros(1), 1.0
     interpolant = interpolate(model, elements, slice(None), with_rates=False)
@@ -167,7 +167,7 @@ def test_what_kinematics_miss_is_below_its_bound(rng):
         box = InterpolatedFrame(YieldingFlow(frame, ("k1",), 2, 0.05), np.arange(1))
         ends = frame.parameters["k1"] * (1 + 0.02 * np.array([[-1], [1]]))
         model, _ = box._model(*ends)
-        elements = box._motions(model, None)
+        elements, _ = box._motions(model, None)
         if elements is None:  # the box is too wide for one order of events
             continue
         found = interpolate(model, elements, slice(None), with_rates=False)
@@ -241,7 +241,7 @@ def crisp_motion(rng):
     box = InterpolatedFrame(flow, np.arange(0))
     point = np.array([frame.parameters["k1"]])
     model, _ = box._model(point, point)
-    return model, box._motions(model, None)
+    return model, box._motions(model, None)[0]
 
 
 def defects_of(model, elements):
@@ -328,7 +328,7 @@ def test_what_passes_the_yield_force_at_some_inputs_alone_is_counted(rng):
     frame = isolated_building(rng, 1)
     box = InterpolatedFrame(YieldingFlow(frame, ("k1",), 1.5, 0.05), np.arange(1))
     model, _ = box._model(*frame.parameters["k1"] * (1 + 1e-5 * np.array([[-1], [1]])))
-    elements = box._motions(model, None)
+    elements, _ = box._motions(model, None)
     if elements is None:  # a yield drift is grazed
         return
     # The force of the slider shall rise along the input, by half of the yield force in all.
