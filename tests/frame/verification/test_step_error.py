@@ -189,7 +189,7 @@ def test_a_force_that_ends_at_a_node_widens_no_step_but_its_own(count, rng):
     assert (beyond_ends <= found).all()
     assert found[has_jump] < 0.5 * off_chord[has_jump]
     assert found[end - 2] < 0.5 * found[end - 1]
-    assert np.median((found / off_chord)[~has_jump]) <= 4.0
+    assert found[~has_jump].max() <= 2 * off_chord[~has_jump].max()
 
 
 @pytest.mark.parametrize("parts", [1, 4, 12])
