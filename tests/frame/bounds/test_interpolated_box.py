@@ -219,19 +219,37 @@ def test_bounds_on_the_coarse_grid_are_those_on_the_fine_one(names, monkeypatch)
     assert coarse.upper == pytest.approx(fine.upper, rel=1e-9, abs=1e-12 * fine.upper.max())
 
 
-def test_an_event_behind_the_end_of_only_some_motions_does_not_count(rng):
-    # Free motions reach the yield drift at their first peak, or do not, just behind the end.
+def just_yielding(rng):
+    """A building that moves freely and reaches its yield drift at its first peak; when, and this."""
     still = Accelerogram(0.05, np.zeros(30))
     frame = isolated_building(rng, 1, outputs=("q1",), ground=still, v0=[0.5] * 2)
     frame = replace(frame, yield_force=[1e9] * 2)
-    k = np.array([frame.stiffness[0]])
-    motion = np.abs(YieldingFlow(frame, ("k1",), 1.0, 0.01).values(k[np.newaxis])[0, :, 0])
+    k = frame.stiffness[0]
+    motion = np.abs(YieldingFlow(frame, ("k1",), 1.0, 0.01).values(np.array([[k]]))[0, :, 0])
     peak = int(motion.argmax())
-    frame = replace(frame, yield_force=[float(k[0] * motion[peak]), 1e9])
-    flow = YieldingFlow(frame, ("k1",), 0.01 * round(0.8 * peak), 0.01)
+    frame = replace(frame, yield_force=[float(k * motion[peak]), 1e9])
+    return frame, 0.01 * peak, motion[peak]
+
+
+def test_an_event_behind_the_end_of_only_some_motions_does_not_count(rng):
+    # Free motions reach the yield drift at their first peak, or do not, just behind the end.
+    frame, time, drift = just_yielding(rng)
+    k = np.array([frame.stiffness[0]])
+    flow = YieldingFlow(frame, ("k1",), 0.01 * round(80 * time), 0.01)
     box = InterpolatedFrame(flow, np.arange(1))
     found = box.bounds(0.99 * k, 1.01 * k, np.full((len(flow.time), 1), 1e-9))
-    assert found.error < 1e-3 * np.sqrt(k[0]) * motion[peak]
+    assert found.error < 1e-3 * np.sqrt(k[0]) * drift
+
+
+@pytest.mark.parametrize("names", [("k1", "fy1"), ("fy1", "k1")])
+def test_the_input_that_decides_whether_a_storey_yields_is_named(names, rng):
+    frame, time, _ = just_yielding(rng)
+    flow = YieldingFlow(frame, names, time + 0.2, 0.01)
+    centre = np.array([frame.parameters[x] for x in names])
+    radius = centre * [{"k1": 1e-6, "fy1": 0.3}[x] for x in names]
+    allowed = np.full((len(flow.time), 1), 1e-9)
+    found = InterpolatedFrame(flow, np.arange(2)).bounds(centre - radius, centre + radius, allowed)
+    assert found.axis == names.index("fy1")
 
 
 def crisp_motion(rng):
