@@ -60,8 +60,10 @@ ROUNDING = 1e-9
 EXTRA_INTERVALS = 60
 # Elements of one march at most, for each interval of the loads and each substep between samples.
 MAX_ELEMENTS = 8
-# Part of the least room for events that are left out that an element may take without a closer
+# Norm S, as a multiple of the room at its time for events that are left out, at which a box is
+# given up as too wide, and the part of the least room that an element may take without a closer
 # look (tuned).
+GIVE_UP = 10.0
 SMALL_VIOLATION = 1e-4
 # Length of an element that begins and ends at fixed times, as a fraction of the largest one, and
 # the same where much may be left out (tuned: the polynomial of the load misses little of intervals
@@ -456,22 +458,32 @@ class InterpolatedFrame:
         self, model: BoxModel, rows: OutputRows, elements: Elements, room: Array | None
     ) -> BoxBounds | None:
         """Return bounds by what interpolated motions miss, or None where they go too far astray."""
-        small = 0.0 if room is None else SMALL_VIOLATION * float(room.min())
+        small = 0.0
+        give_up: Array = np.full(len(elements.phase), np.inf)
+        if room is not None:
+            small = SMALL_VIOLATION * float(room.min())
+            edges = self.loads[0].edges
+            give_up = GIVE_UP * np.interp(elements.begin.min(axis=1), edges[:-1], room)
         varies = np.ptp(elements.length, axis=1) > 0
         groups: list[tuple[BoxModel, Ints]] = []
-        for of_group, mask in ((model.fixed, ~varies), (model, varies)):
+        # Elements at events come first, since errors are largest there.
+        for of_group, mask in ((model, varies), (model.fixed, ~varies)):
             numbers = np.flatnonzero(mask)
-            size = max(CHUNK // (MAX_TERMS * 3 * of_group.grid.mass.size), 4)
-            starts = range(0, len(numbers), size)
-            groups += [(of_group, numbers[first : first + size]) for first in starts]
+            groups += [(of_group, x) for x in _chunks(of_group, numbers)]
         of_path = rows.magnitude[:, -1]
         start = _start_error(model, elements)
+        norm = np.full(model.parts**model.inputs, start)
         swept = []
         for of_group, chosen in groups:
             found = interpolate(of_group, elements, chosen, with_rates=rows.uses_rates)
             if found is None:
                 return None
             missed = defects(found, small)
+            if of_group is model:
+                grown = norm + (missed.growth[:, np.newaxis] + missed.violation).cumsum(axis=0)
+                if (grown.min(axis=1) > give_up[chosen]).any():
+                    return None
+                norm = grown[-1]
             values, error = output_series(found, rows, missed.level)
             reached = values.sum(axis=1)
             at_end = np.stack([-reached, reached], axis=-1).max(axis=2)
@@ -516,8 +528,7 @@ class InterpolatedFrame:
         rough = upper.max(axis=-1)
         beyond = (rough - known).max(axis=(1, 2))
         order = np.argsort(-beyond)[: np.count_nonzero(beyond > 0)]
-        for first in range(0, len(order), size):
-            here = order[first : first + size]
+        for here in _chunks(model, order):
             here = here[(rough[here] > peaks).any(axis=(1, 2))]
             found = interpolate(model, elements, here, with_rates=rows.uses_rates)
             assert found is not None  # as it was found before
@@ -592,6 +603,12 @@ class InterpolatedFrame:
             if self.flow.system.quantity(name) == ("residual", z):
                 of_output = values[..., column, :]
                 of_output[...] = np.clip(of_output, -least, most)
+
+
+def _chunks(model: BoxModel, numbers: Ints) -> list[Ints]:
+    """Divide numbers of elements into groups whose arrays have about `CHUNK` numbers each."""
+    size = max(CHUNK // (MAX_TERMS * 3 * model.grid.mass.size), 4)
+    return [numbers[first : first + size] for first in range(0, len(numbers), size)]
 
 
 def _start_error(model: BoxModel, elements: Elements) -> float:
