@@ -16,6 +16,8 @@ from alphacut.base.arrays import Array
 
 MAX_LENGTH = 300
 """Largest length of a message in characters, about three lines of a terminal."""
+SHORT_PLACE = 40
+"""Characters of the end of a place that always stand in a message."""
 
 
 def printable(value: object, most: int = MAX_LENGTH) -> str:
@@ -114,12 +116,17 @@ class RefusedError(ValueError):
             text = f"{key} is {value_text or 'empty'}"
             if value is None:
                 text = f"{key} is missing"
-            if place:
-                text = f"{place}: {text}"
+            if shown_place:
+                text = f"{shown_place}: {text}"
             if allowed_text:
                 text = f"{text}; allowed: {allowed_text}"
             return text
 
+        shown_place = place
+        excess = len(sentence(printable(value), allowed)) + len(cure) - MAX_LENGTH
+        if excess > 0 and len(place) > SHORT_PLACE:
+            # Of a path the end says most, the name of the file.
+            shown_place = f"…{place[-max(SHORT_PLACE, len(place) - excess - 3) :]}"
         super().__init__(fit_message(printable(value), allowed, sentence, cure))
 
     def __reduce__(self) -> tuple[type[RefusedError], tuple[str, str | None, str, str, str]]:
