@@ -91,7 +91,8 @@ class RefusedError(ValueError):
         value: The value as the caller wrote it; None if it is missing.
         allowed: The allowed values, such as "values in (0, 1]".
         cure: What the caller can do, where `allowed` does not say it.
-        place: File, and line, of the value; empty where the key is enough to find it.
+        place: File, and line, of the value; empty where the key is enough to find it. Of a message
+            that is too long its begin is left out before anything else.
 
     Example:
         >>> RefusedError("mesh.size", -1, "values in (0, 1]")
@@ -125,7 +126,7 @@ class RefusedError(ValueError):
         shown_place = place
         excess = len(sentence(printable(value), allowed)) + len(cure) - MAX_LENGTH
         if excess > 0 and len(place) > SHORT_PLACE:
-            # Of a path the end says most, the name of the file.
+            # Of a path the end says most, the name of the file. "…" and "; " take 3 characters.
             shown_place = f"…{place[-max(SHORT_PLACE, len(place) - excess - 3) :]}"
         super().__init__(fit_message(printable(value), allowed, sentence, cure))
 

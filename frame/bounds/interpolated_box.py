@@ -78,7 +78,7 @@ MAX_MOVED = 3.0
 # Parts of an element's time on which the side of the slider's force is sought (tuned).
 SIDE_PARTS = 8
 SMALL_EVENT = 1e-8
-# Changes of this side that a plan reckons with (tuned).
+# Changes of the side of the slider's force that the room for left-out events reckons with (tuned).
 SIDE_CHANGES = 20
 # Largest difference of the times of an event at the parameter sets of a box, as a fraction of the
 # elastic period (tuned: far below the time between two events with one side).
@@ -94,7 +94,8 @@ class BoxBounds:
         steps: The same over the step before each node, shape (T, m, 2).
         peaks: The same over all times, shape (m, 2).
         error: Bound of the energy norm S of the error at the end, in J^½.
-        axis: Number of the input along which motions differ by an event; None if there is none.
+        axis: Number of the input, among all of the flow, at whose two ends the most different
+            numbers of motions have an event without a common order; None if there is none.
     """
 
     upper: Array
@@ -207,7 +208,7 @@ class InterpolatedFrame:
         elements, alone = self._motions(model, room)
         if elements is None:
             along = np.abs(alone @ grid(model.inputs, model.degree))
-            if not along.any():
+            if not (along > 1e-9).any():  # but for rounding as many at either end of each input
                 return self.infinite
             return replace(self.infinite, axis=int(self.active[along.argmax()]))
         return self._sweep(model, rows, elements, room) or self.infinite
@@ -224,8 +225,9 @@ class InterpolatedFrame:
         # The error of a drift without hardening is bounded by the integral of S alone, and that of
         # the plastic path by changes of side.
         by_drift = rows.of_drift * model.direction_norm * end + rows.without_drift
-        soft = np.sqrt(max(model.low.stiffness[model.place], 1e-300))
-        plastic = min(1 / soft, model.direction_norm * end) + 2 / np.sqrt(model.low.slider)
+        plastic = min(1 / model.soft_root, model.direction_norm * end) + 2 / np.sqrt(
+            model.low.slider
+        )
         by_norm = np.minimum(rows.by_norm, by_drift)
         by_norm += rows.magnitude[:, -1] * 2 * SIDE_CHANGES * plastic
         # Outputs that stay at rest, on which S has no influence, do not count.
@@ -403,7 +405,8 @@ class InterpolatedFrame:
         z = model.place
         loads, last = self.loads
         n, n_sets = at.mass.shape
-        # The Taylor series over an element converges fast where |λ| h ≤ 1 for all eigenvalues λ.
+        # The Taylor series over an element converges fast where |λ| h ≤ 1 for all eigenvalues λ;
+        # where nothing happens an element may be twice as long (`CALM`).
         incidence = drifts(np.eye(n), axis=0)  # drifts of displacements
         elastic = at.stiffness + at.slider * (np.arange(n) == z)[:, np.newaxis]
         zero = np.zeros((n_sets, n, n))
@@ -505,10 +508,11 @@ class InterpolatedFrame:
         norms = start + (done.growth[:, np.newaxis] + done.violation).cumsum(axis=0)
         most = norms.max(axis=1)
         drift = (done.times[:, 5] * model.direction_norm * most + done.drift).cumsum()
-        soft = np.sqrt(max(model.low.stiffness[model.place], 1e-300))
         path: Array = np.zeros(len(most))
         if of_path.any():
-            path = _path_errors(model, elements, done, np.minimum(drift, most / soft), most)
+            path = _path_errors(
+                model, elements, done, np.minimum(drift, most / model.soft_root), most
+            )
         if path[-1] == np.inf:
             return None
         # What errors add: on each part of the box by S, everywhere by the slider's force beyond its

@@ -107,6 +107,11 @@ class BoxModel:
         z = self.place
         return float(np.sqrt(self.high.inverse_mass[max(z - 1, 0) : z + 1].sum()))
 
+    @property
+    def soft_root(self) -> float:
+        """Lower bound of κ^½ of the yielding storey, in (N/m)^½; above 0 by rounding at least."""
+        return float(np.sqrt(max(self.low.stiffness[self.place], 1e-300)))
+
     def elastic_stiffness(self, of: Properties[Array]) -> Array:
         """Return the sum of bounds of all storeys' stiffness and of that of the slider, (N,)."""
         found = of.stiffness.copy()

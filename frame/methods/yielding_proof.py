@@ -36,8 +36,8 @@ MIN_WIDTH = 2.0**-14
 MAX_INPUTS = 3
 """Most inputs with a width: the number of sub-boxes grows as a power of theirs."""
 ROOM = 1.5
-"""Fraction of the distance of motions below the attained peak and the wanted gap that may be spent
-on events that are left out (tuned)."""
+"""Fraction that events that are left out may spend of the wanted gap, and of the distance of what
+follows in a sub-box below the attained peak (tuned)."""
 ROOM_TO_LIMIT = 1.5
 """The same of the distance of peaks from a limit (tuned: in the mean over the box, on whose parts
 it counts, what is left out costs about a third of its largest cost)."""
@@ -153,7 +153,8 @@ class _SubBox:
 
 
 _Open = tuple[float, int, _SubBox, Array, int]
-"""Key and number of an open sub-box, it, and what `_Search._explore` found of it."""
+"""An open sub-box in the heap: minus its score, its number, it, its largest magnitudes from each
+time node on, and the input along which it is to be bisected."""
 
 
 class _Search:
@@ -266,7 +267,7 @@ class _Search:
                 (low if is_above else high)[axis] = middle
                 self._add(heap, self._bounded(low, high, later, box))
             progress(self.count / budget)
-        self.open += [x[2] for x in heap]
+        self.open += [box for _, _, box, _, _ in heap]
 
     def is_closed(self, box: _SubBox) -> bool:
         """Return whether a sub-box says all that is asked.
@@ -324,12 +325,16 @@ class _Search:
         return within + "; ".join(texts)
 
     def _allowed(self, later: Array) -> Array | None:
-        """Return by how much left-out events may widen outputs over a sub-box, (T, m); None if any.
+        """Return by how much left-out events may widen the outputs over a sub-box, in their units.
 
         It is a fraction of the distance to the wanted gap above the attained peak, or to the limit.
 
         Args:
             later: Largest magnitudes in the sub-box from each time node on, shape (T, m).
+
+        Returns:
+            From each time node on, shape (T, m); None where all limits are answered, so that any
+            finite bounds suffice.
         """
         to_gap = ROOM * (self.gap + np.maximum(self.peak - later, 0.0))
         to_gap[:, later[0] == 0] = np.inf  # what stays at rest
