@@ -9,6 +9,7 @@ import pytest
 from alphacut.frame import Limit, StoreyFrame, decide, envelope, peaks
 from alphacut.frame.analyses.limits import thresholds_of
 from alphacut.frame.analyses.peaks import close_peaks
+from alphacut.frame.bounds.interpolated_box import InterpolatedFrame
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.yielding import YieldingFlow
@@ -136,6 +137,25 @@ def test_a_message_names_open_ranges_and_bounds_in_their_units():
     assert "k1 from 6.0000 MN/m to 24.000 MN/m and fy1 from 100.00 kN to 400.00" in str(
         refused.value
     )
+
+
+def test_where_no_plan_succeeds_the_bounds_are_those_without_one(rng, monkeypatch):
+    def without_plan(self, low, high, allowed=None):
+        return bounds(self, low, high) if allowed is None else self.infinite
+
+    frame = isolated_building(rng, 1, outputs=("q1",))
+    k = frame.parameters["k1"]
+    bounds = InterpolatedFrame.bounds
+    monkeypatch.setattr(InterpolatedFrame, "bounds", without_plan)
+    inputs = {"k1": Interval(0.9999 * k, 1.0001 * k)}
+    motion = {"duration": 1.5, "step": 0.05, "progress": False}
+    found = envelope(frame, inputs, "proof", boxes=4, alpha=[0], **motion)
+    assert found.facts["closed_fraction"] == 0
+    flow = YieldingFlow(frame, ("k1",), 1.5, 0.05)
+    values, reached = flow.values_and_peaks(rng.uniform(0.9999 * k, 1.0001 * k, (50, 1)))
+    assert (found.lower[0] <= values).all()
+    assert (values <= found.upper[0]).all()
+    assert reached.max() <= peaks(found)["q1"].proved[0]
 
 
 def test_what_a_message_guarantees_is_rounded_up():
