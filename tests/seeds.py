@@ -3,6 +3,7 @@
     ./enter python -m tests.seeds 200                            # all, with 200 seeds each
     ./enter python -m tests.seeds 200 tests/frame/spectra        # those of one folder
     ./enter python -m tests.seeds 200 --seconds 60 --not-slow    # no more than a minute each
+    ./enter python -m tests.seeds 200 --shared    # the parameters of a test share its seeds
 
 Each file of tests has one process, in which its tests run again with one seed after the other; as
 many run at once as there are cores. A line for each test says how many seeds it got, and which ones
@@ -33,11 +34,13 @@ class Repetition:
     Args:
         seeds: Seeds of each test.
         seconds: Processor time in s after which a test gets no further seed.
+        is_shared: Whether each seed goes to one of a test's parameters, in turn, not to all.
     """
 
-    def __init__(self, seeds: range, seconds: float) -> None:
+    def __init__(self, seeds: range, seconds: float, is_shared: bool) -> None:
         self.seeds = seeds
         self.seconds = seconds
+        self.is_shared = is_shared
         self.spent: dict[str, float] = defaultdict(float)  # processor s by the name of a test
         self.passed: dict[str, int] = defaultdict(int)
         self.failed: dict[str, list[int]] = defaultdict(list)  # seeds
@@ -50,6 +53,17 @@ class Repetition:
     def pytest_collection_modifyitems(self, items):
         """Leave out tests that draw nothing."""
         items[:] = [item for item in items if "rng" in item.fixturenames]
+        if self.is_shared:
+            names: dict[str, list[str]] = defaultdict(list)  # with parameters, by that without
+            for item in items:
+                of_test = names[item.nodeid.split("[")[0]]
+                if _name(item) not in of_test:
+                    of_test.append(_name(item))
+            items[:] = [
+                item for item in items
+                if (item.callspec.params["rng"] - self.seeds.start)
+                % len(of_test := names[item.nodeid.split("[")[0]]) == of_test.index(_name(item))
+            ]  # fmt: skip
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item):
@@ -95,9 +109,9 @@ def _processor_time() -> float:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Register the repetition that the environment describes."""
-    first, count, seconds = os.environ["ALPHACUT_SEEDS"].split()
+    first, count, seconds, is_shared = os.environ["ALPHACUT_SEEDS"].split()
     seeds = range(int(first), int(first) + int(count))
-    config.pluginmanager.register(Repetition(seeds, float(seconds)))
+    config.pluginmanager.register(Repetition(seeds, float(seconds), is_shared == "True"))
 
 
 def main() -> int:
@@ -111,11 +125,13 @@ def main() -> int:
         "--seconds", type=float, default=1e9, help="longest processor time for a test"
     )
     parser.add_argument("--first", type=int, help="first seed (else a random one)")
+    parser.add_argument("--shared", action="store_true", help="give each seed to one parameter")
     parser.add_argument("--not-slow", action="store_true", help="without tests that are slow")
     options = parser.parse_args()
     first = secrets.randbelow(10**9) if options.first is None else options.first
     print(f"seeds from {first} on", flush=True)
-    environment = os.environ | {"ALPHACUT_SEEDS": f"{first} {options.count} {options.seconds}"}
+    numbers = f"{first} {options.count} {options.seconds} {options.shared}"
+    environment = os.environ | {"ALPHACUT_SEEDS": numbers}
     words = [sys.executable, "-m", "pytest", "-q", "-p", "tests.seeds", "--tb=short", "--no-header"]
     words += ["-o", "console_output_style=none", "--show-capture=no"]
     if options.not_slow:

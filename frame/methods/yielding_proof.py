@@ -251,7 +251,8 @@ class _Search:
         # Sub-boxes that have no bounds come first, the widest ones before others, and then those
         # that are farthest from an answer.
         heap: list[_Open] = []
-        self._add(heap, self._bounded(self.low, self.high, self._explore(self.low, self.high)[0]))
+        allowed = self._allowed(self._explore(self.low, self.high)[0])
+        self._add(heap, self._bounded(self.low, self.high, allowed))
         while heap and self.count < budget:
             _, _, box, later, axis = heappop(heap)
             if self.is_closed(box):  # as attained values have risen since
@@ -261,13 +262,20 @@ class _Search:
                 self.open.append(box)
                 continue
             middle = (box.low[axis] + box.high[axis]) / 2
+            allowed = self._allowed(later)
             for is_above in (False, True):
                 low = box.low.copy()
                 high = box.high.copy()
                 (low if is_above else high)[axis] = middle
-                self._add(heap, self._bounded(low, high, later, box))
+                self._add(heap, self._bounded(low, high, allowed, box))
             progress(self.count / budget)
-        self.open += [box for _, _, box, _, _ in heap]
+        # What no plan bounds is bounded without one, however roughly.
+        left = [*self.open, *(box for _, _, box, _, _ in heap)]
+        self.open = []
+        for box in left:
+            is_finite = np.isfinite(box.peaks).all()
+            self.open.append(box if is_finite else self._bounded(box.low, box.high, None, box))
+            progress(1.0)
 
     def is_closed(self, box: _SubBox) -> bool:
         """Return whether a sub-box says all that is asked.
@@ -368,12 +376,12 @@ class _Search:
         return later, int((moved / np.maximum(later[0], 1e-300)).sum(axis=1).argmax())
 
     def _bounded(
-        self, low: Array, high: Array, later: Array, parent: _SubBox | None = None
+        self, low: Array, high: Array, allowed: Array | None, parent: _SubBox | None = None
     ) -> _SubBox:
         """Return a sub-box with its bounds, which are at most those of its parent."""
         self.count += 1
         try:
-            found = self.frame.bounds(low, high, self._allowed(later))
+            found = self.frame.bounds(low, high, allowed)
         except UnprovedError:  # what must be positive may be so on narrower boxes
             found = self.frame.infinite
         upper = np.stack([found.upper, found.steps])
