@@ -16,6 +16,13 @@ Progress = Callable[[float], None]
 """A function that takes the completed fraction of a computation, 0 to 1."""
 
 
+class EnoughError(Exception):
+    """What a progress function raises to end a search that can answer with what it knows.
+
+    The proof of a yielding storey can while it bisects; others let it pass.
+    """
+
+
 class Foretold(float):
     """A completed fraction, with the time in s that is left of the stage it belongs to.
 
@@ -59,6 +66,15 @@ def foretelling(progress: Progress) -> Progress:
         progress(Foretold(done, elapsed / done - elapsed if is_even else None))
 
     return report
+
+
+def is_enough(progress: Progress, done: float) -> bool:
+    """Report a completed fraction, and return whether the search should end; see `EnoughError`."""
+    try:
+        progress(done)
+    except EnoughError:
+        return True
+    return False
 
 
 def searching(progress: Progress | None) -> Progress:

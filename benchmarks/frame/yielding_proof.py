@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 
 from alphacut.base.number_text import STANDARD_GRAVITY
+from alphacut.base.progress_bar import EnoughError
 from alphacut.frame import (
     Accelerogram,
     BilinearIsolator,
@@ -56,10 +57,8 @@ RECORD = "record-2008.AT2"
 """Record of the repository under which corners miss the most."""
 MASS = 100e3
 """Mass of each floor of a building, in kg."""
-FIRST_BOXES = 24
-"""Most sub-boxes of a first proof, whose time says how many a second one may have."""
-MOST_OF_TIME = 0.7
-"""Fraction of the time that is left that the second proof should take."""
+BISECTING = 0.6
+"""Fraction of the time after which sub-boxes are bisected no further."""
 OUTPUTS = ("q1", "ductility1", "residual1", "dissipated1")
 DURATION = 6.0
 STEP = 0.02
@@ -180,7 +179,8 @@ def random_cases(
         label = f"{number}: {frame.floors} floors, {', '.join(inputs)}"
         start = time.process_time()
         try:
-            found = prove_within(frame, inputs, options.gap, duration, options.seconds)
+            limits = {"boxes": 1000, "seconds": options.seconds}
+            found = prove(frame, inputs, options.gap, duration=duration, **limits)
         except UnprovedError as error:
             refused += 1
             print(f"{label}: refused: {error}", flush=True)
@@ -198,28 +198,6 @@ def random_cases(
     print(f"median of proved over reached {np.median(ratios):.5f}; {of_all}")
 
 
-def prove_within(
-    frame: StoreyFrame, inputs: dict[str, Interval], gap: float, duration: float, seconds: float
-) -> Envelope:
-    """The closer one of two proofs; the time of the first says how many sub-boxes there may be."""
-    start = time.process_time()
-    found = None
-    boxes: float = FIRST_BOXES
-    for _ in range(2):
-        try:
-            until = start + seconds
-            found = prove(frame, inputs, gap, duration=duration, boxes=boxes, until=until)
-            if found.facts["closed_fraction"] == 1:
-                break
-        except UnprovedError:
-            if found is None and boxes > FIRST_BOXES:
-                raise
-        spent = time.process_time() - start
-        boxes *= max(MOST_OF_TIME * (seconds - spent) / spent, 1.5)
-    assert found is not None
-    return found
-
-
 def prove(
     frame: StoreyFrame,
     inputs: dict[str, Interval],
@@ -227,19 +205,25 @@ def prove(
     *,
     duration: float,
     boxes: float,
-    until: float = np.inf,
+    seconds: float = np.inf,
 ) -> Envelope:
-    """The guaranteed envelope of one cut, up to a processor time in s."""
+    """The guaranteed envelope of one cut, within so much processor time."""
+    until = time.process_time() + seconds
+    is_enough = False
+
+    def spend(_: float) -> None:
+        nonlocal is_enough
+        left = until - time.process_time()
+        if left < 0:
+            raise UnprovedError("more processor time than --seconds", "take narrower inputs")
+        if left < (1 - BISECTING) * seconds < np.inf and not is_enough:
+            is_enough = True
+            raise EnoughError
+
     return envelope(
         frame, inputs, "proof", gap=gap, duration=duration, step=STEP, alpha=[0], boxes=boxes,
-        progress=lambda _: _spend(until),
+        progress=spend,
     )  # fmt: skip
-
-
-def _spend(until: float) -> None:
-    """Refuse what takes longer than up to a processor time in s."""
-    if time.process_time() > until:
-        raise UnprovedError("more processor time than --seconds", "take narrower inputs")
 
 
 def excess(frame: StoreyFrame, found: Envelope, rng: np.random.Generator, motions: int) -> float:

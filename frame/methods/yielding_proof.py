@@ -7,7 +7,7 @@ sub-box rest on.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 
 import numpy as np
@@ -16,7 +16,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import FailedError
 from alphacut.base.nature import rounded
 from alphacut.base.number_text import engineering
-from alphacut.base.progress_bar import Progress
+from alphacut.base.progress_bar import Progress, is_enough
 from alphacut.frame.bounds.interpolated_box import InterpolatedFrame
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -33,6 +33,8 @@ YIELDING_GAP = 0.01
 and midpoints of sub-boxes, so that closer gaps take many of them)."""
 MIN_WIDTH = 2.0**-14
 """Width of a sub-box, as a fraction of that of the whole, at which further ones do not help."""
+BISECTED = 0.8
+"""Fraction of the work, as progress tells it, at which all sub-boxes are bisected."""
 MAX_INPUTS = 3
 """Most inputs with a width: the number of sub-boxes grows as a power of theirs."""
 ROOM = 1.5
@@ -243,7 +245,7 @@ class _Search:
 
         Args:
             budget: Most sub-boxes.
-            progress: Called with the completed fraction.
+            progress: Called with the completed fraction; ends the effort by an EnoughError.
 
         Raises:
             UnprovedError: A quantity that must be positive may not be so over any sub-box.
@@ -261,21 +263,32 @@ class _Search:
             if box.high[axis] - box.low[axis] < MIN_WIDTH * self.width[axis]:
                 self.open.append(box)
                 continue
-            middle = (box.low[axis] + box.high[axis]) / 2
             allowed = self._allowed(later)
-            for is_above in (False, True):
-                low = box.low.copy()
-                high = box.high.copy()
-                (low if is_above else high)[axis] = middle
+            for low, high in _halves(box, axis):
                 self._add(heap, self._bounded(low, high, allowed, box))
-            progress(self.count / budget)
-        # What no plan bounds is bounded without one, however roughly.
-        left = [*self.open, *(box for _, _, box, _, _ in heap)]
+            if is_enough(progress, BISECTED * self.count / budget):
+                break
+        self._bound_roughly([*self.open, *(box for _, _, box, _, _ in heap)], progress)
+
+    def _bound_roughly(self, left: list[_SubBox], progress: Progress) -> None:
+        """Bound sub-boxes for which no plan succeeds without one, and keep all as the open ones.
+
+        Those that have no such bounds either are bisected, up to as many as there were sub-boxes.
+        """
         self.open = []
-        for box in left:
-            is_finite = np.isfinite(box.peaks).all()
-            self.open.append(box if is_finite else self._bounded(box.low, box.high, None, box))
-            progress(1.0)
+        most = self.count + 2 * len(left)
+        while left:
+            box = left.pop(0)
+            if not np.isfinite(box.peaks).all() and self.count < most:
+                box = self._bounded(box.low, box.high, None, box)
+                if not np.isfinite(box.peaks).all():
+                    parts = (box.high - box.low) / self.width
+                    axis = int(parts.argmax()) if box.axis is None else box.axis
+                    left += [replace(box, low=x, high=y) for x, y in _halves(box, axis)]
+                    continue
+            self.open.append(box)
+            done = len(self.open) / (len(self.open) + len(left))
+            is_enough(progress, BISECTED + (1 - BISECTED) * done)
 
     def is_closed(self, box: _SubBox) -> bool:
         """Return whether a sub-box says all that is asked.
@@ -488,6 +501,13 @@ def known_peaks(threshold: Threshold, values: Array, peaks: Array) -> Array:
     outwards = values if threshold.side else -values
     least = outwards.max(axis=1) - MAX_IMBALANCE * np.abs(values).max(axis=1)
     return np.stack([least, np.full(len(peaks), np.inf)])
+
+
+def _halves(box: _SubBox, axis: int) -> list[tuple[Array, Array]]:
+    """Return the ends of the two halves of a sub-box along an input."""
+    low, high = box.low.copy(), box.high.copy()
+    low[axis] = high[axis] = (box.low[axis] + box.high[axis]) / 2
+    return [(box.low, high), (low, box.high)]
 
 
 def _probes(low: Array, high: Array) -> Array:
