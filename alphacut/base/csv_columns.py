@@ -22,6 +22,12 @@ NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 """A number in plain ASCII digits."""
 
 
+REMARK = re.compile(
+    r"(?:^|(?<=[\d.]))\s*(?:#|//|(?:\s;\s*|;\s+)(?!nan|inf)(?=[^\W\d])).*", re.IGNORECASE
+)
+"""A comment, on a line of its own or behind a number, with its mark."""
+
+
 def length_columns(path: Path, columns: Sequence[str]) -> tuple[Ints, Array]:
     """Read columns of lengths from a CSV file, separated by commas, semicolons or tabs.
 
@@ -95,7 +101,7 @@ def fields(path: Path) -> list[Line]:
 
     The separator is the semicolon or the tab if the header has one, else the comma; commas between
     digits are then decimal commas, unless numbers have points. Comments are lines that begin
-    with #.
+    with #, and what stands behind a number and # or a lone semicolon.
 
     Returns:
         Number of each line as an editor shows it, from 1, and its fields; two lines at least.
@@ -116,6 +122,8 @@ def fields(path: Path) -> list[Line]:
     # Line by line, so that each row keeps the number that an editor shows.
     rows: list[Line] = []
     for row, line in texts.items():
+        if rows:
+            line = REMARK.sub("", line)
         if has_commas and rows:
             line = re.sub(r"(?<=\d),(?=\d)", ".", line)
         try:

@@ -141,14 +141,15 @@ _QUANTITIES = {
 
 # A number in words before a unit, as "thousandths of an inch".
 _PARTS = (
-    r"(?i)(?:tenth|hundredth|thousandth|millionth|mil[eé]sima|d[eé]cima|cent[eé]sima|tausendstel"
-    r"|zehntel|hundertstel|milli[eè]me|hundred|thousand|million|milli)\w*\s+"
-    r"(?:of\s+(?:an?\s+)?|de\s+)?$"
+    r"(?i)(?:(?:tenth|mil[eé]sima|d[eé]cima|cent[eé]sima|tausend|zehntel|hundert|hundred|thousand"
+    r"|mil+i|billion|kilo|mega|mi[ck]ro|nano|mio|mill|mrd|tsd|migliai|milh|duizend|miljoen|тыс|млн"
+    r"|миллион)\w*\.?\s+|miles\s+|[百千万]+\s*)(?:of\s+(?:an?\s+)?|d[ei]\s+)?$"
 )
 TRANSFORMED = (
     r"\b(?:normali[sz]ed|normali[sz]ation|non-?dimensional\w*|dimensionless|scaled\s+by|divided|squared?|roots?"
     r"|log(?:10|arithm\w*)?|invers\w+|inverted|doubled|halved|twice|reciprocal\w*|tenths?|hundredths?|thousandths?"
-    r"|hundreds|thousands|millions|units\s+of\s+(?:the|its))\b"
+    r"|hundreds|thousands|mil+ions|units\s+of\s+(?:the|its)|m[uo]ltipli[cezé]\w*|multiply|mio|mrd|tsd"
+    r"|tausend\w*|millionen|milliers|migliaia|milioni|millones|miles\s+de|milhares|тыс|млн)\b"
 )
 """Words of numbers that are no longer in the unit beside them, in small letters."""
 
@@ -378,7 +379,8 @@ def mentions(text: str) -> list[Mention]:
         end = parsed.end
         next_start = spans[index + 1][0] if index + 1 < len(spans) else len(plain)
         unit = unit_of_atoms(parsed.atoms)
-        if re.search(r"(?<![\w.])1\s?/\s?$", plain[last_end:start]):  # as 1/s
+        is_inverted = re.search(r"(?<![\w.])1\s?/\s?\(?$", plain[last_end:start]) is not None
+        if is_inverted:  # as 1/s
             unit = unit_of_atoms(tuple((name, -power) for name, power in parsed.atoms))
         name = plain[start:end]
         number = _BEFORE.search(plain, last_end, start)
@@ -392,7 +394,7 @@ def mentions(text: str) -> list[Mention]:
                 behind = None
         if unit.dimension in ("sample", "pixel", "voxel", "cycle"):
             continue  # which are words
-        is_single = len(parsed.atoms) == 1 and parsed.atoms[0][1] == 1
+        is_single = len(parsed.atoms) == 1 and parsed.atoms[0][1] == 1 and not is_inverted
         is_last = _NAMED_NUMBERS.search(plain, 0, start) and not plain[end:].strip(" .\"'#)")
         is_sure = bool(
             not (is_single and name.lower() in _WEAK) or number or is_announced or is_last
@@ -402,7 +404,7 @@ def mentions(text: str) -> list[Mention]:
             numbers = tuple(_numbers(next(filter(None, which.groups()))))
         elif unit.dimension and re.search(r"\d\.?\s*$", plain[last_end:start]):
             numbers = (math.nan,)  # of a range, as "0.1-25 Hz", or a power of ten
-        if re.search(_PARTS, plain[last_end:start]):
+        if re.search(_PARTS, plain[:start]):
             numbers = (math.nan,)
         begin = number.start() if number else start
         stop = behind.end() if behind else end

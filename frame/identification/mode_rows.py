@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.csv_columns import ColumnHead, fields, number, text_of
+from alphacut.base.csv_columns import REMARK, ColumnHead, fields, number, text_of
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.stated import Stated, settled
 from alphacut.base.units import (
@@ -56,8 +56,11 @@ _OTHER_NUMBERS = (
     r"|ratios?|relative|reduced|per\s?cent|db|decibels?|half)\b|p[eé]r[ií]od(?!og|ic)|dauer\b|\b1\s*/\s*f|ω|2\s*[x×*·]?\s*π|^T\b|\bf\w?\s*/\s*f"
     rf"|{FACTOR}|{TRANSFORMED}|\bper\s+minute|\b(?:kreis|winkel)\w*frequen"
 )
+_DEVIATION = r"std|deviation|scatter|error|uncertaint|standardabweich|scarto|[ée]cart|desvia"
 _RELATIVE = (
-    r"(?i)(?:std|deviation|scatter|error|uncertaint)\w*\b.*(?:%|\bper\s?cent|\brelative|\bratio)"
+    rf"(?i)(?:{_DEVIATION})\w*\b.*(?:%|\bper\s?cent|\brelati[vf]|\bratio)"
+    r"|\bvaria(?:tions?\s?(?:s?k|co)|n[cz])|co\w+\s+(?:of|de|di)\s+varia|(?<!-)\bco?v\b(?!-)"
+    r"|half-?\s?width|[ck]onfiden|[2-9]\s*(?:sigma|σ|std)"
 )
 
 
@@ -104,11 +107,16 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
     place = f"{path.name}, header"
     shown = ",".join(header)[:80]
     lines = enumerate(text_of(path).splitlines(), 1)
-    comments = {f"line {k}": x for k, x in lines if x.startswith("#") and k != head_row}
+    remarks = ((k, REMARK.search(x)) for k, x in lines if k != head_row)
+    comments = {f"line {k}": x[0].strip() for k, x in remarks if x}
     has_deviations = bool({"frequency_std", "shape_std"} & columns.keys())
     if not override:
-        for text in (*header, *comments.values()):
-            _require_frequencies(place, text, has_deviations=has_deviations)
+        heads = (*header, *comments.values())
+        # Beside two units a comment on that of the deviations is not read; that of their column is.
+        are_mixed = len(set(re.findall(r"\b\w?Hz\b", " ".join(heads)))) > 1
+        for text in heads:
+            is_mixed = are_mixed and text[:1] == "#"
+            _require_frequencies(place, text, has_deviations=has_deviations, is_mixed=is_mixed)
     allowed = (
         "mode,frequency [Hz],q1,q2 … with the floors that were measured, in one unit; frequency_std"
         " [Hz] and shape_std may stand before q1"
@@ -119,12 +127,16 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
     )
     is_known = is_known and len({x for name, x in units.items() if name[0] == "q"}) < 2
     require(is_known, place, shown, allowed)
-    of_head = [x for name, x in units.items() if name[:1] == "f" and x and not override]
-    stated = [Stated(_hertz_of(place, x), x, place) for x in of_head]
+    of_head = "" if override else units["frequency"]
+    stated = [Stated(_hertz_of(place, of_head), of_head, place)] if of_head else []
     found = unit_of_frequencies(path.name, stated, comments, unit, override=override)
     cure = "write the unit into the header, frequency [Hz], or say frequency_unit"
     if found is None:
         raise RefusedError(place, f"{shown}, without a unit", "frequencies with a unit", cure)
+    hertz = {"frequency": found.value, "frequency_std": found.value}
+    of_deviations = units.get("frequency_std", "")
+    if of_deviations not in ("", units["frequency"]):  # each column in its own unit
+        hertz["frequency_std"] = _hertz_of(place, of_deviations)
 
     # Frequencies and deviations are positive; amplitudes have either sign.
     positive = [columns[x] for x in ("frequency", "frequency_std", "shape_std") if x in columns]
@@ -134,8 +146,8 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
         for column in range(len(header)):
             if cells[column : column + 1] != [""]:
                 values[column] = number(path, row, cells, column)
-        for name in {"frequency", "frequency_std"} & columns.keys():
-            values[columns[name]] *= found.value
+        for name in hertz.keys() & columns.keys():
+            values[columns[name]] *= hertz[name]
         mode = values[columns["mode"]]
         fits = mode >= 1 and mode % 1 == 0 and all(values[column] > 0 for column in positive)
         allowed = "a mode from 1, frequency and deviations above 0"
@@ -183,7 +195,7 @@ def unit_of_frequencies(
     return settled(name, "frequency_unit", own, said, override=override, unsure=unsure)
 
 
-def _require_frequencies(place: str, text: str, *, has_deviations: bool) -> None:
+def _require_frequencies(place: str, text: str, *, has_deviations: bool, is_mixed: bool) -> None:
     """Raise RefusedError where a text says that numbers are no frequencies in a unit."""
     rest = without_units(text, mentions(text)).strip(" #")
     # Shapes may be normalised.
@@ -191,6 +203,7 @@ def _require_frequencies(place: str, text: str, *, has_deviations: bool) -> None
     is_other = any(re.search(_OTHER_NUMBERS, clause) for clause in clauses)
     is_other |= re.search(r"(?i)(?:%|\bper\s?cent)\s+of\b", text) is not None
     is_other |= has_deviations and re.search(_RELATIVE, text) is not None
+    is_other |= is_mixed and re.search(rf"(?i)(?:{_DEVIATION})[^,;]*Hz", text) is not None
     cure = "write frequencies in Hz, ω/(2π) or 1/T, and deviations in Hz, without a factor"
     allowed = "frequencies, not angular ones or periods"
     require(not is_other, place, text[:80], allowed, cure)

@@ -31,9 +31,9 @@ _SENSOR = (
 _SITE = r"(?i)altitude|height|elevation|depth|coordinate|vs_?30|\bwave|peak|pg[vd]|distance"
 FACTOR = (
     r"(?:[x×*·]\s*|\b)10\s*(?:\^|\*\*)|[x×*·]\s*10\s*-\s*\d|\b1\.?0*e[-+]?\d"
-    r"|(?<![a-z_])[x×*·]\s*(?:1000*\b|0?\.\d)"
+    r"|(?:(?<![a-z_])x|[×*·])\s*(?:1000*\b|1\.?0*e|0?\.\d)"
     r"|\b(?:scal\w*[\s_]*factor|scal\w*(?=\s*[:=])|(?:multipl\w*|divide\w*)(?:\s+[a-z]+){0,6}|conversion)[\s:=]*"
-    r"(?!1(?:\.0*)?\b)[\d.]|\btimes\s+(?:\d|t\w+)|\bfactor\s*(?:of\s+)?[:=]?\s*(?!1\b)\d|(?<=[a-z])\s*/\s*10+\b"
+    r"(?!1(?:\.0*)?\b)[\d.]|\btimes\s+(?:\d|t\w+)|\b(?:fa[ck]tor|facteur|fattore)\s*(?:of\s+)?[:=]?\s*(?!1\b)\d|(?<=[a-z])\s*/\s*10+\b"
 )
 # Words of times between samples, in some languages, and words of other times and frequencies.
 _SAMPLING = (
@@ -67,6 +67,8 @@ _COUNT = re.compile(
     r"(?:data|points|samples|values|pts))\s*[:=]\s*(\d+)\b(?![./:-])",
     re.IGNORECASE,
 )
+# What stands before a comment in a row of numbers.
+_NUMBERS = re.compile(r"^[-+\d.,;\seEdD\"]*\d[.\s\"]*(?=#|//|;)")
 _SYSTEMS = {r"\bcgs\b": "cm/s^2", r"\bSI\s+units?\b|\bunits?\W+SI\b": "m/s^2"}
 
 
@@ -106,7 +108,7 @@ class TextStatements:
         """Return what the lines with these indices state."""
         found = cls()
         for row in lines:
-            text = file.lines[row]
+            text = _NUMBERS.sub("", file.lines[row])
             place = f"line {file.line_number(row)}"
             for clause in text.split(";"):
                 found._add_clause(clause, row, place)
@@ -175,8 +177,8 @@ class TextStatements:
                 self.lone_steps.append(stated)
         # Loads, angles and drifts of an instrument or a site are no quantity of the numbers.
         name = named_quantity(rest)
-        is_quantity = name.endswith(
-            ("displacement", "velocity", "spectrum", "counts", "voltage", "jerk", "acceleration")
+        is_quantity = name != "" and (
+            not name.endswith(("force", "stress", "angle")) or re.match(r"\W*\w+\W*(?:,|$)", rest)
         )
         if is_quantity and not is_peak and not re.search(_SITE, text):
             self.quantities.append((name, row))
@@ -235,21 +237,29 @@ class TextStatements:
 
 def named_quantity(text: str) -> str:
     """Return the quantity that a line names, as "a velocity"; empty of an acceleration or none."""
-    if other := re.search(r"\b(?:jerk|(?:angular|rotational)\s+acc\w*)", text, re.IGNORECASE):
+    if other := re.search(
+        r"\b(?:jerk|(?:angular|rotational)\s+acc\w*|(?:winkel|dreh)beschl\w*)", text, re.IGNORECASE
+    ):
         return "a jerk" if other[0].lower() == "jerk" else "an angular acceleration"
     spectrum = r"\bspectral\s+acc|\b(?:response|fourier|amplitude|pseudo\W*\w*)\s+spectr\w+"
     is_matched = re.search(r"match|compatib|target|artific|design|fit", text, re.IGNORECASE)
     if re.search(spectrum, text, re.IGNORECASE) and not is_matched:
         return "a spectrum"
-    if re.search(r"(?:\b|_)(?:a|acc(?:el(?:s|eration\w*)?)?|ag)(?:\b|_)", text, re.IGNORECASE):
+    # A lone "a" is a word of many languages.
+    of_acceleration = (
+        r"acc(?:[eé]l\w*)?|acel\w*|\w*beschleunig\w*|ускорен\w*|ag|a(?=_|\W*$|\s*[\[(=:/])"
+    )
+    if re.search(rf"(?:\b|_)(?:{of_acceleration})(?:\b|_)|加速度|가속도", text, re.IGNORECASE):
         return ""
     words_of_quantities = {
-        "a displacement": r"disp(?:l\w*)?|d[ée]placements?|desplaz\w+|spostament\w*|verschieb\w*"
-        r"|deflection|drift",
-        "a velocity": r"vel(?:oc\w*)?|speed|vitesses?|geschwindigkeit|скорост\w",
-        "a spectrum": r"p?sa",
+        "a displacement": r"disp(?:l\w*)?|d[ée]placements?|desplaz\w+|desloca\w+|spostament\w*"
+        r"|\w*verschieb\w*|(?:schwing|feder|stell)?wege?|\w*auslenk\w*|verplaatsing\w*|f[oö]rsk\w+ning"
+        r"|пере?мещен\w*|смещен\w*|\w*(?:[变変]位|位移|변위)\w*|deflection|drift",
+        "a velocity": r"vel(?:oc\w*)?|speed|vitesses?|\w*geschwindigkeit\w*|(?:schwing)?schnelle"
+        r"|snelheid|hastighe[dt]|скорост\w*|\w*(?:速度|속도)\w*|pr[eę]dko[sś]\w+|rychlost\w*",
+        "a spectrum": r"p?s[av]",
         "a force": r"forces?|loads?|thrust|(?:base )?shear",
-        "a strain": r"strains?",
+        "a strain": r"strains?|\w*dehnung\w*|d[eé]formations?|deformaci[oó]n|deformazion[ei]",
         "a stress": r"stress(?:es)?|pressure",
         "an angle": r"rotation|angle|tilt",
         "a number of counts": r"counts?",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import lru_cache
 from math import isclose, isfinite
@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.csv_columns import NUMBER, ColumnHead
+from alphacut.base.csv_columns import NUMBER, REMARK, ColumnHead
 from alphacut.base.errors import RefusedError, cure_of, require
 from alphacut.base.stated import Stated, settled
 from alphacut.base.units import ACCELERATION, FORCE, factor_of, unit_of
@@ -108,7 +108,9 @@ class _Table:
         is_row = re.compile(r'[\s"]*[-+]?[.,]?\d').match
         first = next((k for k in plain if is_row(file.lines[k])), len(file.lines))
         rows = {k: file.lines[k] for k in plain if k >= first}
-        texts = tuple(k for k in lines if k not in rows)
+        behind = [k for k, text in rows.items() if REMARK.search(text)]
+        rows |= {k: REMARK.sub("", rows[k]) for k in behind}
+        texts = (*(k for k in lines if k not in rows), *behind)
         divide = _divider(list(rows.values()))
         cells = {k: divide(text) for k, text in rows.items()}
         # Where a line gives the format of numbers that touch, their columns are fixed.
@@ -173,8 +175,8 @@ class _Table:
                 raise _wrong_row(self, line, expected=width)
         return np.array([[float(cell) for cell in self.rows[line]] for line in rows])
 
-    def series(self, first: int = 0) -> Array:
-        """Return the numbers of all rows from one on, one after another, shape (numbers,).
+    def series(self) -> Array:
+        """Return the numbers of all rows, one after another, shape (numbers,).
 
         The last row alone may have fewer numbers than the others.
 
@@ -183,7 +185,7 @@ class _Table:
                 first; or the columns seem to be several components, since numbers change less from
                 row to row within a column than along the rows, on average.
         """
-        *full, last = list(self.rows)[first:]
+        *full, last = self.rows
         width = len(self.rows[(full or [last])[0]])
         numbers = self.numbers(full, width)
         rest = self.numbers([last], min(len(self.rows[last]), width))
@@ -337,19 +339,32 @@ def read_table(
     table = _table_of(file)
     allowed = "a header with units, and rows of numbers below it"
     require(len(table.rows) > 1, file.name, f"{len(table.rows)} rows", allowed)
+    # A row "600 0.0100 656" above as many numbers or rows as it says is a head of count and step.
+    first, *others = table.rows
+    head = list(table.rows[first])
+    if head == [str(len(others) - 1)]:  # count and step in lines of their own
+        head += table.rows[others.pop(0)]
+    n_behind = sum(len(table.rows[k]) for k in others)
+    has_step = len(head) > 1 and _are_numbers(head) and 0 < float(head[1]) < MAX_STEP
+    is_head = head[0].isdecimal() and len(others) > 1 and (has_step or head == [str(len(others))])
+    said_count = int(head[0]) if is_head else 0
+    nearest = min(n_behind, len(others), key=lambda n: abs(n - said_count))
+    # A count that is wrong by two is refused below.
+    is_head = is_head and (
+        said_count == nearest or 10 <= said_count <= nearest + 2 <= said_count + 4
+    )
+    if is_head:
+        columns = [_Column()] * len(table.rows[others[0]])
+        table = replace(table, heads=(), columns=columns, rows={k: table.rows[k] for k in others})
     found = TextStatements.of(file, [k for k in table.texts if k not in table.heads])
     said_step = Stated(step, f"{step:g} s") if step is not None else None
     place = file.location(table.start)
-
-    # A row "600 0.0100 656" above as many numbers as it says is a head of count and step.
-    first_row = next(iter(table.rows.values()))
-    n_behind = sum(map(len, table.rows.values())) - len(first_row)
-    is_head = len(first_row) > 1 and _are_numbers(first_row) and float(first_row[0]) == n_behind > 1
-    if is_head and 0 < float(first_row[1]) < MAX_STEP:
-        line = f"line {file.line_number(next(iter(table.rows)))}"
-        found.steps.append(Stated(float(first_row[1]), f"{first_row[1]} s", line))
-    else:
-        is_head = False
+    if is_head:
+        line = f"line {file.line_number(first)}"
+        found.steps += [Stated(float(x), f"{x} s", line) for x in head[1:2]]
+        found.counts.append(Stated(said_count, f"{said_count} samples", line))
+        # As many rows as it says may have several columns.
+        is_head = nearest == n_behind
     if table.heads:
         table.numbers(list(table.rows)[:1])  # names a row of another count of cells
     # Of two columns the first has times, unless both are components.
@@ -385,7 +400,7 @@ def read_table(
         raise table.refusal(f"say records.{key}: {reason}")
     remarks = [own_unit.remark]
     if is_series and not channel:
-        samples = table.series(int(is_head))
+        samples = table.series()
     else:
         samples = table.numbers(list(table.rows))[:, index]
     if has_times:
@@ -610,6 +625,8 @@ def _even_steps(table: _Table, factor: float, stated_step: float | None = None) 
     odd = np.abs(np.diff(time) - usual) > 2 * MAX_UNEVENNESS * abs(usual)
     wrong = 1 + int(odd.argmax())
     cure = "times must rise evenly: mend, sort or resample the rows"
+    if wrong == 1:
+        cure += "; mark a head of count and step by #"
     if are_rounded:
         cure = "digits of the times were lost: write them in full, or say records.step"
     value = f"time {time[wrong]:g} s after {time[wrong - 1]:g} s"

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from io import StringIO
 from itertools import compress
+from math import isnan
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from alphacut.base.errors import RefusedError, path_of, printable, require
 from alphacut.base.memory import require_free_memory, require_text
 from alphacut.base.stated import Stated, require_overrides, settled, warn_of_overrides
 from alphacut.base.units import (
+    FORCE,
     FREQUENCY,
     TRANSFORMED,
     Mention,
@@ -53,21 +55,28 @@ ALLOWED = "a file .mtx, .sti, .mas, .pch, .op4, .full, .npz, .npy or .csv of fin
 MAX_ROWS = 5000
 # Abaqus writes 1e36 or more on the diagonal of an unknown that it holds. No spring comes near it.
 HELD_STIFFNESS = 1e35
-# Quantities by the dimensions of units; those of forces are of all.
+# Quantities by the dimensions of units.
 _QUANTITIES = {
+    FORCE: "force", "m": "length", "s": "time", "rad": "angle",
     "kg": "mass", "kg m2": "mass", "kg m": "mass", "kg s-2": "stiffness", "kg m2 s-2": "stiffness",
     "kg m2 rad-1 s-2": "stiffness", "kg s-1": "damping", "kg m2 s-1": "damping",
     "kg m2 rad-1 s-1": "damping", "kg m s-1": "damping",
 }  # fmt: skip
 _UNKNOWN_PART = r"(?i)(?<![^\W\d_])(?!mass)[^\W\d_]{2,4}\s*/\s*$"
+# Words that are a unit which is not known, in brackets or behind a colon.
+_UNKNOWN_UNIT = (
+    r"(?i)\[(?!SI\]|[KMC]\w?\])[^\W\d_][^\s\[\]]{0,9}\]|\bunits?\s*[:=]\s*(?!SI\b|consist)[^\W\d_]"
+    r"|\b(?:mas+\w*|st[ei]+f\w*|entries|values|werte)\s+(?:in|en)\s+(?!SI\b)[^\W\d_]{2,}\W*$"
+)
 _NAMES = {"mass": "mass|trägheit", "stiffness": "stiff|steif|rigid", "damping": "damp|dämpf|amort"}
 # What stands before the unit of all entries, where that has a number.
 _IN_UNITS = r"(?i)\b(?:in|units?(?:\s+of)?)\W*$|[\[(]\s*$|^\W*$"
 # Words of numbers that are no entries in units of SI, whatever units stand beside them.
 _OTHER_NUMBERS = (
-    r"(?i)\b(?:weights?|compliance|flexibility|half|halved|doubled|twice|imperial|cgs|customary|ratios?"
-    rf"|relative|us\s+units|wtmass\W+(?!1?\.?0*\s*$).*)\b|%|\bper\s?cent|\bmass\w*\s+as\s+forces?"
-    rf"|{TRANSFORMED}|\b[KMC]\^?\(?-1\b|\b[KMC]\s*/\s*[a-z]{{1,3}}\b"
+    r"(?i)\b(?:weights?|poids|pes[io]s?|gewicht\w*|compliance|flexibility|half|halved|doubled|twice|imperial|cgs|customary|ratios?"
+    rf"|relative|us\s+units|wtmass\W+(?!1?\.?0*\s*$).*)\b|%|\bp(?:er|our?|or|ro)\s?[cz]i?ent|\bscaled\b|\bnegative\s+of|\bmass\w*\s+as\s+forces?"
+    rf"|{TRANSFORMED}|\b[KMC]\^?\(?-1\b|\b[KMC]\s*/\s*\w{{1,3}}\b"
+    r"|(?:1/\d|\d\s*[*·×])\s*[KMC]\b|\btimes\s+[a-z]"
 )
 
 
@@ -188,37 +197,54 @@ def _stated_factor(path: Path, member: str, quantity: str) -> float:
         is_other |= not units and has_unknown_words(rest)
         # Of a unit of which a part is not known, as "Tn/m", nothing else would be seen.
         is_other |= any(re.search(_UNKNOWN_PART, x.before) for x in units)
-        is_other |= any(x.dimension == "" and x.is_sure and not x.numbers for x in units)
-        allowed = "entries of stiffness, damping or mass in units"
-        require(is_name or not is_other, place, line.strip()[:60], allowed, cure)
+        is_other |= any(re.match(r"\s*/\s*[^\W\d_]", x.behind) for x in units)
+        is_other |= re.search(_UNKNOWN_UNIT, rest) is not None
+        # As "N/(m kg)", of which "N/(m" is understood.
+        is_other |= any(x.text.count("(") > x.text.count(")") for x in units)
+        allowed = f"entries of {quantity or 'stiffness, damping or mass'} in units"
+        # Units of mass and force in one product are a list of them, as kN-m-t.
+        is_other_unit = any(
+            x.is_sure and not x.numbers and "kg2" not in x.dimension
+            and x.dimension not in _QUANTITIES and _metric_factor(x) != 0
+            for x in units
+        )  # fmt: skip
+        is_of_entries = not is_other_unit and (is_name or not is_other)
+        require(is_of_entries, place, line.strip()[:60], allowed, cure)
         units = [x for x in units if x.dimension and not (x.numbers and _is_value_of_another(x))]
         is_of_numbers = (
             any(x.is_sure for x in units)
-            or re.search(r"(?i)scal|multipl|divi|times|factor|[a-z]/1|[x×*·]\s*\d", rest)
+            or re.search(r"(?i)scal|multipl|divi|times|fa[ck]t|[a-z]/1|[x×*·]\s*\d|\bin\s+1", rest)
             is not None
         )
         has_factor |= is_of_numbers and re.search(FACTOR, rest, re.IGNORECASE) is not None
         has_factor |= any(
-            one.is_sure and one.is_multiple and re.search(_IN_UNITS, one.before) for one in units
+            one.is_sure
+            and one.is_multiple
+            and (any(map(isnan, one.numbers)) or re.search(_IN_UNITS, one.before))
+            for one in units
         )
         require(not has_factor, place, line.strip()[:60], "units without a factor", cure)
         for one in units:
             factor = _metric_factor(one)
             allowed = "units of SI, or kN and t with m"
             require(factor != 0 or not one.is_sure, place, f"in {one.shown}", allowed, cure)
+            is_of_entries = one.is_sure and not one.is_multiple
             if factor:
-                where = unsure if one.is_multiple or not one.is_sure else stated
+                where = stated if is_of_entries else unsure
                 where.append(Stated(factor, one.shown, where_it_stands))
-                # A force alone in brackets is the unit of each number, and of no matrix.
-                is_force = one.behind.startswith(("]", ")"))
-                kind = _QUANTITIES.get(one.dimension, "force" if is_force else "")
-                kinds |= {kind} if where is stated else set()
+            kind = _QUANTITIES.get(one.dimension, "list")
+            # A force alone in brackets is the unit of each number, and of no matrix.
+            if kind == "force" and one.behind.startswith(("]", ")")):
+                kind = "a force"
+            is_length = kind == "length" and not one.numbers
+            kinds |= {kind} if is_of_entries or is_length else set()
     found = settled(path.name, "unit", stated)
-    if kinds <= {""} and len(named) == 1:
-        kinds |= named
-    # A unit of forces alone, or beside one of masses, is one of a system of units.
-    is_system = kinds <= {"", "mass"} and kinds != {"mass"}
-    is_asked = not quantity or quantity in kinds or is_system
+    # Units of forces and of something else, or of masses, lengths and times, are a system.
+    is_system = kinds <= {"list", "force", "mass", "length", "time", "angle"}
+    is_system &= "list" in kinds or ("force" in kinds and len(kinds) > 1) or len(kinds) > 2
+    if (is_system or not kinds) and len(named) == 1:
+        kinds, is_system = named, False
+    is_asked = not quantity or not kinds or quantity in kinds or is_system
     what = f"of {' and '.join(sorted(kinds))}, by {found or 'its words or ending'}"
     require(is_asked, path.name, what, f"of {quantity}", "name the file of that quantity")
     taken = found or Stated(1.0, "of SI")

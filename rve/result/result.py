@@ -228,8 +228,14 @@ class HomogenisedStiffness:
 
     @property
     def fractions(self) -> Array:
-        """Mean fractions of the phases of the cell under f_Θ, matrix first, shape (2,)."""
-        assert self.cell is not None
+        """Mean fractions of the phases of the cell under f_Θ, matrix first, shape (2,).
+
+        Raises:
+            RefusedError: The cell is a mesh from a file, or a level set.
+        """
+        if self.cell is None:
+            cure = "integrate them in the program that made the mesh"
+            raise RefusedError("fractions", None, "a cell of a matrix and a particle", cure)
         return np.asarray(self.cell.fractions(self.curve.theta) @ self.curve.weights)
 
     @property

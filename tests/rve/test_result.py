@@ -236,3 +236,8 @@ def test_the_error_in_theta_of_the_shear_along_fibres_covers_where_a_map_bends(b
     found = constants(result)
     ratio = found.errors["G_L"] / abs(found.values["G_L"] - exact)
     assert 1 <= ratio < 2  # so that half of it would not cover
+
+
+def test_fractions_of_a_cell_that_is_not_known_are_refused():
+    with refuses("fractions"):
+        _ = replace(CELL, cell=None).fractions

@@ -152,6 +152,12 @@ def test_other_arguments_are_refused(tmp_path, name, options, key):
         ("# pulsazioni\nmode,frequency,q1,q2", "Hz", None),
         ("# Kreiseigenfrequenzen\nmode,frequency,q1,q2", "Hz", None),
         ("# Schwingungsdauer\nmode,frequency,q1,q2", "Hz", None),
+        ("# f in Mio. Hz\nmode,frequency,q1,q2", "Hz", None),
+        ("# a coefficient of variation\nmode,frequency [Hz],frequency_std,q1", "", None),
+        ("# écart-type relatif\nmode,frequency [Hz],frequency_std,q1", "", None),
+        ("# std in mHz\nmode,frequency [Hz],frequency_std,q1", "", None),
+        ("mode,frequency,frequency_std [mHz],q1", "", None),
+        ("# by SSI-COV, std in kHz\nmode,frequency [kHz],q1,q2", "", 1000),
     ],
 )
 def test_the_unit_of_frequencies_is_stated_or_asked_for(tmp_path, head, unit, factor):
@@ -180,6 +186,14 @@ def test_decimal_commas_beside_semicolons_and_units_beside_signs_are_read(tmp_pa
     for unit in ("Hz", "kHz"):
         with pytest.raises(RefusedError, match="override"):
             read_modes(path, frequency_unit=unit)
+
+
+def test_deviations_in_a_unit_of_their_own_and_comments_behind_numbers_are_read(tmp_path):
+    text = "mode,frequency%s,frequency_std [%sHz],q1,q2\n1,4,%s,-1,0.5%s\n"
+    expected = read_modes(written(tmp_path, text % (" [Hz]", "", "0.004", "")))[0].frequency
+    for mark in ("  # in Hz", " ; in Hz"):
+        [mode] = read_modes(written(tmp_path, text % ("", "m", "4", mark)))
+        assert mode.frequency.cut(0.5) == pytest.approx(expected.cut(0.5))
 
 
 def test_the_cure_of_periods_is_their_reciprocal(tmp_path):

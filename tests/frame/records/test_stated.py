@@ -116,6 +116,27 @@ def test_numbers_that_touch_are_read_by_their_format_or_said_to_touch(tmp_path):
     assert record.samples == pytest.approx(numbers)
 
 
+@pytest.mark.parametrize("mark", ["  # gal, dt=0.01 s", " ; gal, dt=0.01 s", " // gal, dt=0.01 s"])
+def test_comments_behind_numbers_are_comments(tmp_path, mark):
+    path = saved(tmp_path, f"1.5{mark}\n", COLUMN)
+    record = read_record(path)
+    assert (record.step, len(record.samples)) == (0.01, 61)
+    assert record.samples[1:] == pytest.approx(0.01 * VALUES)
+
+
+@pytest.mark.parametrize("count", [58, 60, 61])
+def test_a_row_of_count_and_step_above_as_many_rows_is_a_head(tmp_path, count):
+    path = tmp_path / "record.txt"
+    path.write_text(f"{count} 0.01\n" + rows_of(TIMED).replace(",", " "))
+    with pytest.raises(RefusedError, match=r"say records\.unit"):
+        read_record(path)
+    if count == 60:
+        assert read_record(path, unit="gal").samples == pytest.approx(0.01 * VALUES)
+    else:
+        with pytest.raises(RefusedError, match=f"{count} samples .line 1"):
+            read_record(path, unit="gal")
+
+
 def test_statements_are_settled_by_one_rule():
     gal, g = Stated(0.01, "gal", "line 3"), Stated(G, "g")
     assert settled("f", "unit", []) is None
@@ -132,6 +153,9 @@ def test_statements_are_settled_by_one_rule():
 
 
 COLUMN = 1
+OTHERS = "Schwinggeschwindigkeit|Schwingweg|Bodenverschiebung|strain gauge|velocità a terra"
+OTHERS += "|a velocity record|déplacement|spostamento|velocidad|desplazamiento|速度|変位|Mio. m/s^2"
+OTHERS += "|10^3 m/s^2|x1000, m/s^2|milli m/s^2|Faktor 9.81, m/s^2|multipliziert, m/s^2"
 HEADS = [
     ("# ACCELERATION TIME HISTORY\n# DT = 0.01 sec   Units: cm/sec/sec\n", COLUMN, 0.01, 0.01),
     ("Station: ABC\nSample rate (Hz): 100\nAcceleration units: mg\nDATA\n", COLUMN, 0.01, G / 1000),
@@ -250,6 +274,7 @@ HEADS = [
     ("multiply with 9.81 for m/s^2; dt 0.01\n", COLUMN, 0.01, None),
     ("sensor 1 V = 1 g; data in volts; 100 Hz\n", COLUMN, 0.01, None),
     ("response spectrum acceleration, g; dt 0.01 s\n", COLUMN, 0.01, None),
+    *((f"{x}, dt 0.01 s\n", COLUMN, 0.01, None) for x in OTHERS.split("|")),
     ("accel. (cgs), tstep .01, f_s = 100 1/s\n", COLUMN, 0.01, 0.01),
 ]
 """Heads with the layout of the numbers, their step in s, and their unit in m/s²; None of others."""

@@ -304,6 +304,7 @@ def test_units_tell_the_quantity_and_names_of_files_state_none(tmp_path):
     np.savez(tmp_path / "n.npz", k=matrix, unit="MN/m")
     (tmp_path / "k.csv").write_text("# damping, kN s/m\n2,-1\n-1,2\n")
     (tmp_path / "s.csv").write_text("# units: kN, m, t\n2,-1\n-1,2\n")
+    (tmp_path / "l.csv").write_text("# units kN-m-t\n2,-1\n-1,2\n")
     (tmp_path / "w.csv").write_text("# W [kN]\n2,-1\n-1,2\n")
     (tmp_path / "c.csv").write_text("# lumped mass matrix\n2,-1\n-1,2\n")
     (tmp_path / "r.csv").write_text("# rigidezza, kN su m\n2,-1\n-1,2\n")
@@ -316,6 +317,7 @@ def test_units_tell_the_quantity_and_names_of_files_state_none(tmp_path):
         "n.npz": (1e6, {"stiffness"}),
         "k.csv": (1e3, {"damping"}),
         "s.csv": (1e3, {"mass", "stiffness", "damping"}),
+        "l.csv": (1e3, {"mass", "stiffness", "damping"}),
         "w.csv": (1e3, set()),
         "c.csv": (1, {"mass"}),
         "r.csv": (1e3, {"stiffness"}),
@@ -331,6 +333,23 @@ def test_units_tell_the_quantity_and_names_of_files_state_none(tmp_path):
             else:
                 with refuses(name):
                     read_matrix(tmp_path / name, name=member, quantity=quantity)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "comments"),
+    [
+        ("stiffness", "entries in 1/s^2|s^-2|[rad^2/s^2]|N/(m kg)|rad/s|m/s|kN|unit: m|N/foo|[EU]"),
+        ("stiffness", "in Mio. N/m|Tausend N/m|milliers de N/m|×10^6|N/m, Faktor 1000|1/2 K"),
+        ("stiffness", "multiply by E|only K/2 stored|times EI|lumped masses; units kN, m"),
+        ("mass", "unit s^2|kN|pesi in kN|poids des planchers|Gewichte|mass matrix, kN"),
+        ("damping", "2 zeta omega in 1/s|(1/s)"),
+    ],
+)
+def test_units_of_other_quantities_and_factors_are_refused(tmp_path, quantity, comments):
+    for comment in comments.split("|"):
+        (tmp_path / "k.csv").write_text(f"# {comment}\n2,-1\n-1,2\n", encoding="utf-8")
+        with pytest.raises(RefusedError):
+            read_matrix(tmp_path / "k.csv", quantity=quantity)
 
 
 def test_a_unit_in_a_script_that_is_not_known_is_refused(tmp_path):
