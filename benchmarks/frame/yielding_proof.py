@@ -57,7 +57,7 @@ RECORD = "record-2008.AT2"
 """Record of the repository under which corners miss the most."""
 MASS = 100e3
 """Mass of each floor of a building, in kg."""
-BISECTING = 0.6
+BISECTING = 0.75
 """Fraction of the time after which sub-boxes are bisected no further."""
 OUTPUTS = ("q1", "ductility1", "residual1", "dissipated1")
 DURATION = 6.0
