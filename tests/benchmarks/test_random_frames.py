@@ -15,6 +15,7 @@ def test_no_motion_of_a_frame_of_each_kind_is_outside(rng):
 
 
 def test_a_motion_above_a_bound_at_a_node_or_between_is_seen(rng, monkeypatch):
+    monkeypatch.setattr("benchmarks.frame.random_frames.DURATION", 0.25)
     seen = []
 
     def moved(found, motions):
