@@ -59,7 +59,7 @@ def test_a_frequency_that_no_frame_has_refutes_it(rng):
     assert identify(frame, inputs, [mode], alpha=[0.1]).is_refuted
 
 
-def test_a_measured_frequency_that_tells_nothing_leaves_the_prior(rng):
+def test_a_measured_frequency_that_tells_nothing_leaves_the_prior():
     frame = StoreyFrame([1.0, 1.0], stiffness=[100.0, 100.0])
     inputs = {"k1": Interval(99, 101), "k2": Interval(99, 101)}
     mode = measured_mode(1, [0.9, 1.0, 1.1])

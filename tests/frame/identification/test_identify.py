@@ -23,7 +23,7 @@ PRIOR: dict[str, FuzzyNumber] = {name: Interval(1.6, 2.4) for name in NAMES}
 
 
 @pytest.fixture
-def rng() -> np.random.Generator:
+def fixed() -> np.random.Generator:
     return np.random.default_rng(20)
 
 
@@ -39,7 +39,7 @@ def modes_at(names, points):
     return squared, root * vectors
 
 
-def measured(truth, rng, *, names=NAMES, modes=(1, 2), floors=(1, 2, 3), records=20, noise=0.01):
+def measured(truth, fixed, *, names=NAMES, modes=(1, 2), floors=(1, 2, 3), records=20, noise=0.01):
     values, vectors = modes_at(names, truth[None])
     found = []
     for mode in modes:
@@ -48,10 +48,10 @@ def measured(truth, rng, *, names=NAMES, modes=(1, 2), floors=(1, 2, 3), records
         frequency = np.sqrt(values[0, mode - 1]) / (2 * np.pi)
         rows = {
             z: shape[z - 1] / shape[largest]
-            + noise * (z - 1 != largest) * rng.standard_normal(records)
+            + noise * (z - 1 != largest) * fixed.standard_normal(records)
             for z in floors
         }
-        frequencies = frequency * (1 + noise * rng.standard_normal(records))
+        frequencies = frequency * (1 + noise * fixed.standard_normal(records))
         found.append(measured_mode(mode, frequencies, rows))
     return found
 
@@ -71,26 +71,26 @@ def agree(found: Identified, points: np.ndarray, level: float) -> np.ndarray:
     return np.all([(low <= x) & (x <= high) for x, (low, high) in columns], axis=0)
 
 
-def test_parameters_of_every_kind_move_the_predicted_frequencies(rng):
+def test_parameters_of_every_kind_move_the_predicted_frequencies(fixed):
     """Each prior is hardly wider than a point that is not the frame's nominal one."""
     names, point = ("E", "l2", "m1", "c3", "I"), np.array([31e9, 2.7, 21e3, 2.2, 3.1e-4])
     prior = {name: Interval(x, x * (1 + 1e-9)) for name, x in zip(names, point, strict=True)}
-    predicted = identify(FRAME, prior, measured(point, rng, names=names)).predictions()
+    predicted = identify(FRAME, prior, measured(point, fixed, names=names)).predictions()
     hertz = np.sqrt(modes_at(names, point[None])[0][0]) / (2 * np.pi)
     assert predicted.lower[0] == pytest.approx(hertz, rel=1e-7)
     assert predicted.upper[0] == pytest.approx(hertz, rel=1e-7)
 
 
 @pytest.mark.parametrize("shown", [{}, {"floors": (1, 3)}, {"floors": ()}, {"modes": (2,)}])
-def test_a_box_holds_all_that_agrees_and_is_sharp(rng, shown: dict[str, tuple[int, ...]]):
+def test_a_box_holds_all_that_agrees_and_is_sharp(fixed, shown: dict[str, tuple[int, ...]]):
     """Frames drawn in a box wider by a tenth: those whose modes agree lie in it and its ranges."""
     prior = {**PRIOR, "c1": Triangular(1.6, 1.9, 2.4)}
     truth = np.array([1.9, 2.1, 2.2])
-    found = identify(FRAME, prior, measured(truth, rng, **shown), alpha=(0.05, 0.5))
+    found = identify(FRAME, prior, measured(truth, fixed, **shown), alpha=(0.05, 0.5))
     predicted, width = found.predictions(), found.upper - found.lower
     for row, level in enumerate(found.alpha):
         ends = found.lower[row] - 0.1 * width[row], found.upper[row] + 0.1 * width[row]
-        points = rng.uniform(*ends, (20000, 3))
+        points = fixed.uniform(*ends, (20000, 3))
         points = points[agree(found, points, float(level))]
         assert len(points) > 20
         assert ((found.lower[row] <= points) & (points <= found.upper[row])).all()
@@ -100,10 +100,10 @@ def test_a_box_holds_all_that_agrees_and_is_sharp(rng, shown: dict[str, tuple[in
             assert np.mean(np.ptp(points, axis=0) / width[row]) > 0.6
 
 
-def test_cuts_are_nested_inside_the_priors_and_feed_an_envelope(rng):
+def test_cuts_are_nested_inside_the_priors_and_feed_an_envelope(fixed):
     truth = np.array([1.9, 2.1, 2.2])
     prior = {**PRIOR, "c1": Triangular(1.6, 1.9, 2.4)}
-    found = identify(FRAME, prior, measured(truth, rng), alpha=(0.05, 0.25, 0.5, 1.0))
+    found = identify(FRAME, prior, measured(truth, fixed), alpha=(0.05, 0.25, 0.5, 1.0))
     assert (np.diff(found.lower, axis=0) >= 0).all()
     assert (np.diff(found.upper, axis=0) <= 0).all()
     for row, level in enumerate(found.alpha):
@@ -119,35 +119,35 @@ def test_cuts_are_nested_inside_the_priors_and_feed_an_envelope(rng):
     assert "c1, c2, c3 in their cuts at α (opinions)" in str(found.claim)
 
 
-def test_a_common_factor_of_stiffnesses_and_masses_is_not_learned(rng):
+def test_a_common_factor_of_stiffnesses_and_masses_is_not_learned(fixed):
     names = (*NAMES, "m1", "m2", "m3")
     nominal = np.array([FRAME.parameters[name] for name in names])
     prior = {name: Interval(0.8 * x, 1.2 * x) for name, x in zip(names, nominal, strict=True)}
-    found = identify(FRAME, prior, measured(nominal, rng, names=names), alpha=(0.05,))
+    found = identify(FRAME, prior, measured(nominal, fixed, names=names), alpha=(0.05,))
     assert min(found.narrowed.values()) > 0.7
     points = nominal * np.linspace(0.8, 1.2, 101)[:, None]
     points = points[agree(found, points, 0.05)]
     assert (np.ptp(points, axis=0) > 0.7 * (found.upper - found.lower)[0]).all()
-    known = identify(FRAME, PRIOR, measured(np.full(3, 2.0), rng), alpha=(0.05,))
+    known = identify(FRAME, PRIOR, measured(np.full(3, 2.0), fixed), alpha=(0.05,))
     assert max(known.narrowed.values()) < 0.5
 
 
-def test_a_measurement_that_no_such_frame_has_is_refuted(rng):
-    refuted = identify(FRAME, PRIOR, measured(np.full(3, 4.0), rng), held_out=[2])
+def test_a_measurement_that_no_such_frame_has_is_refuted(fixed):
+    refuted = identify(FRAME, PRIOR, measured(np.full(3, 4.0), fixed), held_out=[2])
     assert refuted.is_refuted
     assert "storey frame with such parameters is refuted" in str(refuted)
     assert "refuted" in str(refuted.predictions())
     with pytest.raises(RefutedError, match="refuted"):
         _ = refuted.inputs
-    modes = measured(np.full(3, 2.0), rng)
+    modes = measured(np.full(3, 2.0), fixed)
     first = MeasuredMode(1, modes[0].frequency, {**modes[0].shape, 1: Interval(0.8, 0.9)}, 3)
     assert identify(FRAME, PRIOR, [first, modes[1]]).is_refuted
 
 
-def test_claimed_priors_are_joined_with_the_measured_claims(rng):
-    weighed = from_data(10e3 * (1 + 0.01 * rng.standard_normal(8)), "mean", law="normal")
+def test_claimed_priors_are_joined_with_the_measured_claims(fixed):
+    weighed = from_data(10e3 * (1 + 0.01 * fixed.standard_normal(8)), "mean", law="normal")
     prior: dict[str, FuzzyNumber] = {**PRIOR, "m3": weighed}
-    modes = measured(np.array([2, 2, 2, 10e3]), rng, names=(*NAMES, "m3"))
+    modes = measured(np.array([2, 2, 2, 10e3]), fixed, names=(*NAMES, "m3"))
     found = identify(FRAME, prior, modes, alpha=(0.05,))
     names = found.evidence.joint.names
     assert "m3" in names
@@ -240,11 +240,11 @@ def test_what_makes_no_sense_is_refused(make, key):
 
 @pytest.mark.parametrize(("count", "share"), [(1, 0.9), (3, -0.6)])
 def test_shapes_of_known_deviation_hold_the_truth_as_often_as_claimed(count: int, share: float):
-    rng, held = np.random.default_rng(count), 0
+    fixed, held = np.random.default_rng(count), 0
     for _ in range(60):  # all floors scatter alike, and no scatter of chance is refused
-        rows = np.array([[share], [1.0]]) + 0.02 * rng.standard_normal((2, count))
+        rows = np.array([[share], [1.0]]) + 0.02 * fixed.standard_normal((2, count))
         mode = measured_mode(
-            1, 2 + 0.01 * rng.standard_normal(count), {1: rows[0], 2: rows[1]}, shape_deviation=0.02,
+            1, 2 + 0.01 * fixed.standard_normal(count), {1: rows[0], 2: rows[1]}, shape_deviation=0.02,
             frequency_deviation=0.01,
         )  # fmt: skip
         low, high = mode.shape[1].cut(0.1)
@@ -281,12 +281,12 @@ def test_at_level_1_a_prior_that_agrees_is_a_point():
 
 
 @pytest.mark.parametrize("known", [None, 0.1])
-def test_ratios_of_noisy_amplitudes_are_not_biased(known, rng):
+def test_ratios_of_noisy_amplitudes_are_not_biased(known, fixed):
     """A tenth of noise makes the mean ratio a hundredth too large, more than 1000 rows scatter."""
     inside = 0
     for _ in range(15):
-        rows = {1: 0.6 + 0.1 * rng.normal(size=1000), 2: 1 + 0.1 * rng.normal(size=1000)}
-        mode = measured_mode(1, 2 + 0.01 * rng.normal(size=1000), rows, shape_deviation=known)
+        rows = {1: 0.6 + 0.1 * fixed.normal(size=1000), 2: 1 + 0.1 * fixed.normal(size=1000)}
+        mode = measured_mode(1, 2 + 0.01 * fixed.normal(size=1000), rows, shape_deviation=known)
         low, high = mode.shape[1].cut(0.05)
         inside += low <= 0.6 <= high
     assert inside >= 13
