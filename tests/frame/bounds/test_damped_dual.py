@@ -24,7 +24,7 @@ from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.fuzzy import Interval
 from tests.frame.motions import judged_motions, random_points, require_inside
 
-TIME = {"duration": 2.0, "step": 0.02}
+TIME = {"duration": 1.0, "step": 0.02}
 NOISE = np.random.default_rng(4).normal(size=60)
 
 
@@ -66,8 +66,8 @@ def test_no_motion_leaves_the_bounds_at_nodes_or_between(moved, rng):
     assert found.nature == "guaranteed"
     assert found.facts["gap_of_peaks"] < 0.05
     parts = 7
-    points = random_points(inputs, 40, rng)
-    times = np.sort(np.append(found.time, rng.uniform(0, 2.0, (parts - 1) * 100)))
+    points = random_points(inputs, 20, rng)
+    times = np.sort(np.append(found.time, rng.uniform(0, 1.0, (parts - 1) * 50)))
     step = np.searchsorted(found.time, times, side="left")
     require_inside(judged_motions(system, points, inputs, found.time), found, slack=1e-12)
     for values in judged_motions(system, points, inputs, times):

@@ -46,7 +46,7 @@ def bounds_and_motions(frame, names, radius, rng, step=0.05):
     "names", [("k1",), ("fy1",), ("m1", "zeta"), ("k1", "fy1"), ("k1", "fy1", "hardening1")]
 )
 def test_motions_stay_inside_tight_bounds(names, rng):
-    for radius in (1e-4, 1e-4, 1e-3, 3e-3, 0.01, 0.02):
+    for radius in (1e-4, float(rng.choice([1e-3, 3e-3, 0.01, 0.02]))):
         frame = random_storey(rng, gravity=float(rng.choice([0.0, 9.81])))
         found, values, peaks = bounds_and_motions(frame, names, radius, rng)
         if not np.isfinite(found.peaks).all():  # a grazed yield drift may be too wide

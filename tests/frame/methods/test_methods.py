@@ -159,16 +159,16 @@ def test_a_floor_that_does_not_oscillate_is_said_to_have_much_damping():
             envelope(chain, inputs, method=method, **MOTION)
 
 
-@pytest.mark.parametrize("dashpots", [(), (0.0, 2e4, 5e3)])
+@pytest.mark.parametrize("dashpots", [(), (2e4, 5e3)])
 def test_more_inputs_than_a_proof_takes_are_followed_to_the_error_allowed(dashpots, rng):
-    names = ["k1", "k2", "k3", "m1", "m2", "m3", "zeta"]
-    start = {"q0": (0.01, 0.02, 0.03), "damping_ratio": 0.03, "dampers": dashpots}
-    system = StoreyFrame((2e4,) * 3, stiffness=(8e6,) * 3, **start)
+    names = ["k1", "k2", "m1", "m2", "zeta", *["d1", "d2"][: len(dashpots)]]
+    start = {"q0": (0.01, 0.03), "damping_ratio": 0.03, "dampers": dashpots}
+    system = StoreyFrame((2e4,) * 2, stiffness=(8e6,) * 2, **start)
     inputs = {x: Interval(0.9 * system.parameters[x], 1.1 * system.parameters[x]) for x in names}
-    motion = {**MOTION, "alpha": (0,), "duration": 0.8, "integrator": "exact"}
+    motion = {**MOTION, "alpha": (0,), "duration": 0.4, "integrator": "exact"}
     method = frame.Auto(1e-3) if dashpots else frame.ImprovedFollower(2e-4)
     found = envelope(system, inputs, method=method, **motion)
-    values = trajectories(system, inputs, random_points(inputs, 2000, rng), duration=0.8)
+    values = trajectories(system, inputs, random_points(inputs, 500, rng), duration=0.4)
     assert found.method == "improved-graph-follower"
     assert attained(found, system, inputs) <= 1e-9 * np.abs(found.upper).max()
     require_inside(values, found)
