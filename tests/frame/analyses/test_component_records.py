@@ -54,10 +54,10 @@ def test_motions_under_records_of_components_stay_within_the_bounds(components, 
     found = over_records(model, INPUTS, suite, **MOTION, all_angles=all_angles)
     largest = []
     means = 0.0
-    points = random_points(INPUTS, 40, rng)
+    points = random_points(INPUTS, 12, rng)
     angles = np.zeros(1)
     if all_angles:
-        angles = np.radians(np.arange(360))
+        angles = np.radians(np.arange(0, 360, 5))
     for east, north, *up in suite:
         peak = found.by_record["+".join(x.name for x in (east, north, *up))].peak["corner"]
         values = []
@@ -74,7 +74,7 @@ def test_motions_under_records_of_components_stay_within_the_bounds(components, 
         largest.append(of_structures.max())
         means = means + of_structures / len(suite)
         if all_angles:
-            at = round(peak.worst.angle) % 360
+            at = round(peak.worst.angle / 5) % 72
             assert np.max(values[at]) == pytest.approx(peak.reached[0], rel=0.01)
     assert found.peak["corner"].proved[0] >= max(largest)
     assert found.peak["mean corner"].proved[0] >= means.max()

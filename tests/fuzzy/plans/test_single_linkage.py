@@ -131,11 +131,10 @@ def flat_with_a_cone(rng):
 
 
 def test_the_nature_of_bounds_covers_a_cone_on_a_plateau(rng):
-    for _ in range(4):
-        function, inputs, peak = flat_with_a_cone(rng)
-        result = propagate(function, inputs, alpha=[0.0], vectorised=True)
-        is_covered = peak <= (result.upper + result.error).item() + 1e-9
-        assert is_covered or result.nature is Nature.ATTAINED
+    function, inputs, peak = flat_with_a_cone(rng)
+    result = propagate(function, inputs, alpha=[0.0], vectorised=True)
+    is_covered = peak <= (result.upper + result.error).item() + 1e-9
+    assert is_covered or result.nature is Nature.ATTAINED
 
 
 def test_what_never_changes_is_attained_without_a_search():
