@@ -1,5 +1,7 @@
 """Gmsh itself, with which tests write and read meshes."""
 
+from pkgutil import resolve_name
+
 import pytest
 
 
@@ -11,3 +13,16 @@ def gmsh():
     module.option.setNumber("General.Terminal", 0)
     yield module
     module.finalize()
+
+
+@pytest.fixture
+def read_here(monkeypatch):
+    """Meshes are read in this process: the start of another takes longer than all else."""
+    gmsh = pytest.importorskip("gmsh")
+
+    def read(reader, path, **_):
+        found = resolve_name(reader)(path)
+        gmsh.finalize()
+        return found
+
+    monkeypatch.setattr("alphacut.base.apart.read_apart", read)

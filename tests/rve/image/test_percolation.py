@@ -165,7 +165,7 @@ def test_fluxes_that_do_not_balance_are_an_error(monkeypatch, rng):
 
     monkeypatch.setattr(of_fluxes, "sweep_fluxes", leaves_one)
     with pytest.raises(FailedError, match="do not balance"):
-        solve_fluxes(1.0 * porous(rng, 6, porosity=0.3), (1.0,) * 3, solver=TIGHT)
+        solve_fluxes(1.0 * porous(rng, 4, porosity=0.3), (1.0,) * 3, solver=TIGHT)
 
 
 # stiffness
@@ -247,8 +247,8 @@ def test_lower_bounds_of_porous_volumes_rise_with_the_grid_below_the_upper_ones(
     # A few steps come near the best stresses, which alone rise for every draw.
     monkeypatch.setattr(equilibrium, "MAX_STEPS", 300)
     monkeypatch.setattr(equilibrium, "LEAST_GAIN", 1e-8)
-    solid = porous(rng, 6, porosity=porosity, length=1.2)
-    phase = solid * (1 + (len(young) - 1) * porous(rng, 6, porosity=0.5, length=1.2))
+    solid = porous(rng, 4, porosity=porosity, length=1.2)
+    phase = solid * (1 + (len(young) - 1) * porous(rng, 4, porosity=0.5, length=1.2))
     nu = rng.uniform(-0.5, 0.45)
     coarse, fine = (
         solve_image(*moduli(refined(phase, n).astype(int), young, nu), solver=TIGHT).bounds

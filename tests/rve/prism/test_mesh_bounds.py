@@ -130,9 +130,10 @@ def test_a_laminate_has_its_own_stiffness(tmp_path, rng, amplitude):
     assert abs(bounds.upper - bounds.lower).max() < 1e-5 * exact.max()
 
 
-@pytest.mark.parametrize("ratio", [1e9, 1e10])
-def test_a_phase_of_very_unlike_directions_is_inside(tmp_path, rng, ratio):
+@pytest.mark.usefixtures("read_here")
+def test_a_phase_of_very_unlike_directions_is_inside(tmp_path, rng):
     """Of a homogeneous cell, by exact sums of its energies along soft directions."""
+    ratio = 10 ** rng.uniform(9, 10)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     stiffness = (np.array([1e9, 1e9, 1e9 * ratio]) * turn) @ turn.T
     stiffness = (stiffness + stiffness.T) / 2
@@ -212,12 +213,20 @@ def test_stresses_are_in_equilibrium_at_each_theta(name, rng):
     assert work_of_stresses(model, named, rng) < 1e-12
 
 
+@pytest.fixture(scope="module")
+def two_particles():
+    """A model, its phases and bounds of good fields."""
+    model, phases = (
+        MeshModel(MESHES / "two-particles.msh"),
+        {"matrix": SOFT, "particles": Phase(400e9, 0.2)},
+    )
+    return model, phases, model.bounds(LAW, phases)
+
+
 @pytest.mark.parametrize(("scale", "noise"), [(1.0, 1e-4), (1e4, 1e-4), (1e-4, 0.0)])
-def test_any_fields_give_bounds(rng, monkeypatch, scale, noise):
+def test_any_fields_give_bounds(two_particles, rng, monkeypatch, scale, noise):
     """Displacements that are none, and stresses that fit them but need not be symmetric."""
-    phases = {"matrix": SOFT, "particles": Phase(400e9, 0.2)}
-    model = MeshModel(MESHES / "two-particles.msh")
-    good = model.bounds(LAW, phases)
+    model, phases, good = two_particles
     slice_strains = PrismProblem.slice_strains
 
     def forgotten_after_the_mean(self, strains, fluctuations):

@@ -55,6 +55,7 @@ def test_two_particles_are_as_stiff_as_plane_triangles():
     assert 25.739483 < result.modulus / 1e9 < 25.739483 * 1.00015
 
 
+@pytest.mark.usefixtures("read_here")
 @pytest.mark.parametrize(
     ("outline", "contrast", "are_mixed", "layers"),
     [
