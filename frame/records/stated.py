@@ -119,6 +119,7 @@ class TextStatements:
     def _add_clause(self, text: str, row: int, place: str) -> None:
         """Add what a line, or a part of it between semicolons, states."""
         all_units = mentions(text)
+        plain = without_units(text, [])
         rest = without_units(text, [one for one in all_units if one.is_sure])
         units: list[Mention] = []
         for one in all_units:
@@ -157,10 +158,12 @@ class TextStatements:
             self.factors.append(row)
         for bare, is_rate in ((_BARE_STEP, False), (_BARE_RATE, True)):
             for match in bare.finditer(rest):
+                if match[0] != plain[slice(*match.span())]:  # a number with a unit stands between
+                    continue
                 number = float(match["number"].lower().replace("d", "e")) or nan
                 shown = f"{match['number']} {'Hz' if is_rate else 's'}"
                 self.steps.append(_step(number, shown, place, is_rate=is_rate))
-            rest = bare.sub(" ", rest)
+            rest = bare.sub(lambda match: " " * len(match[0]), rest)
         # In words of a language that is not known here, a number may be the step or the rate.
         is_unknown = has_unknown_words(rest)
         # Words in square brackets are a unit, whether it is known or not.

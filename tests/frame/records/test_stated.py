@@ -208,6 +208,7 @@ HEADS = [
     ("# cols: time/s acc/(m/s^2)\n", (" ", 1), 0.01, 1),
     ('"Time (sec)","Acceleration (cm/s/s)"\n', (",", 1), 0.01, 0.01),
     ("Corrected acceleration, 60 points, at 0.01 s, in cm/s2\n", SERIES, 0.01, 0.01),
+    ("Acceleration in cm/s^2, dt = 0.01 s, 60 points\n", COLUMN, 0.01, 0.01),
     ("SAMPLING_RATE: 100 Hz\nUNITS: cm s^-2\n", COLUMN, 0.01, 0.01),
     ("frequency [Hz],amplitude [g]\n", (",", 1), 0.01, None),
     ("Fourier amplitude spectrum\nf,acc [g]\n", (",", 1), 0.01, None),
