@@ -23,7 +23,7 @@ NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 
 REMARK = re.compile(
-    r"(?:^|(?<=[\d.]))\s*(?:#|//|(?:\s;\s*|;\s+)(?!nan|inf)(?=[^\W\d])).*", re.IGNORECASE
+    r"(?:^|(?<=[\d.]))\s*(?:[#!]|//|(?:\s;\s*|;\s+)(?!nan|inf)(?=[^\W\d])).*", re.IGNORECASE
 )
 """A comment, on a line of its own or behind a number, with its mark."""
 

@@ -68,7 +68,7 @@ _COUNT = re.compile(
     re.IGNORECASE,
 )
 # What stands before a comment in a row of numbers.
-_NUMBERS = re.compile(r"^[-+\d.,;\seEdD\"]*\d[.\s\"]*(?=#|//|;)")
+_NUMBERS = re.compile(r"^[-+\d.,;\seEdD\"]*\d[.\s\"]*(?=#|//|[;!])")
 _SYSTEMS = {r"\bcgs\b": "cm/s^2", r"\bSI\s+units?\b|\bunits?\W+SI\b": "m/s^2"}
 
 
