@@ -319,6 +319,26 @@ def test_what_passes_the_yield_force_between_samples_is_counted(rng):
     assert found.most.max() >= beyond.max() * (1 - 1e-6)
 
 
+def test_what_passes_the_yield_force_between_grid_points_of_an_input_is_counted(rng):
+    frame = isolated_building(rng, 1)
+    box = InterpolatedFrame(YieldingFlow(frame, ("k1",), 1.5, 0.05), np.arange(1))
+    model, _ = box._model(*frame.parameters["k1"] * (1 + 1e-5 * np.array([[-1], [1]])))
+    points = grid(1, model.fine)[:, 0]
+    neighbours = np.sort(points)[int(rng.integers(len(points) - 1)) :][:2]
+    middle = neighbours.mean()
+    radius = 0.4 * np.ptp(neighbours)
+    # The force is beyond within this radius alone, and nowhere beyond on the other side.
+    most = radius**2 / 4
+    excess = most * (1 - ((points - middle) / radius) ** 2)
+    assert (np.abs(excess + 1) < 1).all()
+    force = model.grid.force * (1 + excess)
+    powers = np.stack([force, np.zeros_like(force)])[np.newaxis]
+    found = _elastic_violations(model, powers, *np.zeros((2, 1)), 0.0)
+    least = 0.999 * most * model.grid.force.min()
+    assert found.most.max() >= least
+    assert found.integral.max() >= least
+
+
 def test_what_moves_against_its_direction_of_yielding_is_counted_in_full(rng):
     model, elements = crisp_motion(rng)
     backwards = elements._replace(phase=-elements.phase)
