@@ -1,6 +1,5 @@
-"""The front door: case files, units, command line, stages, report; logs as "alphacut", silently."""
+"""The front door: case files, units, command line, stages, report; logs below warnings."""
 
-import logging
 from typing import TYPE_CHECKING
 
 from alphacut.base.first_use import at_first_use
@@ -11,7 +10,5 @@ if TYPE_CHECKING:
 __all__ = ["main"]
 AT_FIRST_USE = {"main": "entry"}
 """Module of each exported name that is imported at its first use: frames in Python need none."""
-
-logging.getLogger(__name__).addHandler(logging.NullHandler())
 
 __getattr__, __dir__ = at_first_use(__name__, AT_FIRST_USE)

@@ -4,6 +4,7 @@ Each model is a frozen dataclass of its resolution with ``solve(radius_map, matr
 or, on a mesh or level set of the user's own, ``solve(law, phases)``.
 
 Example:
+    >>> from alphacut.rve import LOADS, STRAIN
     >>> [load.tolist() for load in LOADS], STRAIN  # eq. 15, Voigt order (11, 22, 12 with 2 ε12)
     ([[0.01, 0.01, 0.0], [0.0, 0.0, 0.02]], 0.01)
 """
@@ -11,11 +12,10 @@ Example:
 from typing import TYPE_CHECKING
 
 from alphacut.base.first_use import at_first_use
-from alphacut.rve.cell.cell import LOADS, STRAIN, Cell, Phase, VoigtPhase
-from alphacut.rve.cell.outline import Ellipse
-from alphacut.rve.result.result import HomogenisedStiffness, StressCurve, effective_modulus
 
 if TYPE_CHECKING:
+    from alphacut.rve.cell.cell import LOADS, STRAIN, Cell, Phase, VoigtPhase
+    from alphacut.rve.cell.outline import Ellipse
     from alphacut.rve.engineering import constants
     from alphacut.rve.fuzzy_cell import FuzzyStiffness, fuzzy_stiffness
     from alphacut.rve.image.conductivity import FuzzyImageConductivity, fuzzy_image_conductivity
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from alphacut.rve.prism.product_space import ProductSpace
     from alphacut.rve.result.loss_factors import loss_factors
     from alphacut.rve.result.reference_bounds import ReferenceBounds, reference_bounds
+    from alphacut.rve.result.result import HomogenisedStiffness, StressCurve, effective_modulus
     from alphacut.rve.series.fibre_constants import fibre_conductivity
     from alphacut.rve.series.model import SeriesModel
     from alphacut.rve.slices.model import SlicesModel
@@ -56,23 +57,32 @@ __all__ = [
     "solve_image", "sphere_conductivity", "thermal_bounds",
 ]  # fmt: skip
 AT_FIRST_USE = {
+    "LOADS": "cell.cell",
+    "STRAIN": "cell.cell",
+    "Cell": "cell.cell",
     "CellFields": "prism.cell_fields",
+    "Ellipse": "cell.outline",
     "FuzzyImageConductivity": "image.conductivity",
     "FuzzyImageStiffness": "image.study",
     "FuzzyStiffness": "fuzzy_cell",
     "GreyImage": "image.study",
+    "HomogenisedStiffness": "result.result",
     "ImageFields": "image.vti",
     "LevelSetModel": "prism.own_mesh",
     "MeshModel": "prism.own_mesh",
+    "Phase": "cell.cell",
     "PrismModel": "prism.model",
     "ProductSpace": "prism.product_space",
     "ReferenceBounds": "result.reference_bounds",
     "SeriesModel": "series.model",
     "SlicesModel": "slices.model",
     "SpheresModel": "spheres.model",
+    "StressCurve": "result.result",
     "ThermalBounds": "image.thermal_expansion",
+    "VoigtPhase": "cell.cell",
     "constants": "engineering",
     "declared_bounds": "image.thermal_expansion",
+    "effective_modulus": "result.result",
     "fibre_conductivity": "series.fibre_constants",
     "fuzzy_image_conductivity": "image.conductivity",
     "fuzzy_image_stiffness": "image.study",

@@ -12,16 +12,14 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from pkgutil import resolve_name
 from tempfile import TemporaryDirectory
-from threading import Thread
-from typing import TypedDict
 
 import numpy as np
 
+from alphacut.base.apart_work import Order
 from alphacut.base.array_files import Numbers
 from alphacut.base.errors import RefusedError
 from alphacut.base.memory import free_memory
@@ -37,20 +35,8 @@ MPI = ("OMPI_", "PMI", "PMIX", "MPI", "HYDRA", "I_MPI", "SLURM_")
 """How the names of variables begin that tell a process that it is one of several."""
 PROGRAM = (
     "import json, sys; order = json.loads(sys.argv[1]); sys.path[:] = order['paths'];"
-    " from alphacut.base.apart import work; work(order)"
+    " from alphacut.base.apart_work import work; work(order)"
 )
-
-
-class Order(TypedDict):
-    """What the process is to read, and its bounds; handed on as JSON."""
-
-    reader: str
-    path: str
-    options: dict[str, object]
-    folder: str
-    paths: list[str]
-    bytes: float
-    seconds: float
 
 
 def read_apart(
@@ -104,8 +90,15 @@ def read_apart(
             allowed = allowed or f"a file that {library} reads"
             cure = cure or "write the file anew, or copy it anew"
             raise RefusedError(path.name, reason, allowed, cure)
-        files = Path(folder).glob("*.npy")
-        return {file.stem: np.load(file, allow_pickle=False) for file in files}
+        return {x.stem: _load(x) for x in Path(folder).iterdir() if x.name != told.name}
+
+
+def _load(file: Path) -> Numbers:
+    """Return an array that the process has left: of NumPy, or bytes of a type code."""
+    if file.suffix == ".npy":
+        array: Numbers = np.load(file, allow_pickle=False)
+        return array
+    return np.fromfile(file, dtype=file.suffix[1:])
 
 
 def _wait(process: subprocess.Popen[bytes], seconds: float) -> int | None:
@@ -119,41 +112,3 @@ def _wait(process: subprocess.Popen[bytes], seconds: float) -> int | None:
         state = Path(f"/proc/{process.pid}/stat")
         if not state.exists() or state.read_text("ascii", "replace").rpartition(")")[2][1] != "R":
             return process.poll()
-
-
-def work(order: Order) -> None:
-    """Read as `read_apart` asks; leave arrays, or why not, what is allowed and the cure."""
-    Thread(target=_end_with_parent, daemon=True).start()
-    _limit(order)
-    folder = Path(order["folder"])
-    told = ["", "", ""]
-    try:
-        read: Callable[..., Mapping[str, Numbers]] = resolve_name(order["reader"])
-        for name, array in read(Path(order["path"]), **order["options"]).items():
-            np.save(folder / f"{name}.npy", array, allow_pickle=False)
-    except MemoryError:
-        told[0] = "too large: the memory that its size allows is not enough"
-    except RefusedError as error:
-        told = [str(error.value), error.allowed, error.cure]
-    except Exception as error:  # of libraries, errors of all kinds
-        told[0] = " ".join(str(error).split())[:150] or type(error).__name__
-    (folder / "told.json").write_text(json.dumps(told), encoding="utf-8")
-
-
-def _end_with_parent() -> None:
-    """End this process where the one that started it has ended, and its input with it."""
-    sys.stdin.buffer.read()
-    os._exit(1)
-
-
-def _limit(order: Order) -> None:
-    """Bound memory and time of this process."""
-    with suppress(ImportError, OSError, ValueError):
-        import resource
-
-        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
-        most = pages * os.sysconf("SC_PAGE_SIZE") + int(order["bytes"])
-        resource.setrlimit(resource.RLIMIT_AS, (most, most))
-        seconds = int(order["seconds"]) + 1
-        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

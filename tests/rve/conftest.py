@@ -2,6 +2,7 @@
 
 from pkgutil import resolve_name
 
+import numpy as np
 import pytest
 
 
@@ -23,6 +24,6 @@ def read_here(monkeypatch):
     def read(reader, path, **_):
         found = resolve_name(reader)(path)
         gmsh.finalize()
-        return found
+        return {name: np.array(numbers) for name, numbers in found.items()}
 
     monkeypatch.setattr("alphacut.base.apart.read_apart", read)
