@@ -17,7 +17,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact, Integrator
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.methods.method import METHODS, Method, require_kinks
+from alphacut.frame.methods.method import METHODS, Method
 from alphacut.frame.result import Ends, Envelope
 from alphacut.frame.structures.linear import (
     LinearSystem,
@@ -203,6 +203,18 @@ def _build_problem(
     return Problem(chosen, UnitFlow(flow, distinct_cuts), cuts.alpha, rows)
 
 
+def require_kinks(model: StructureModel, method: Method | type[Method]) -> None:
+    """Refuse a method that needs derivatives of the response where columns of a model yield.
+
+    Raises:
+        RefusedError: The response has kinks as a function of the parameters.
+    """
+    if yields(model) and not method.takes_kinks:
+        names = [name for name, known in METHODS.items() if known.takes_kinks]
+        allowed = f"{', '.join(names)} where columns yield"
+        raise RefusedError("method", method.name, allowed)
+
+
 def _chosen_method(method: Method | str, options: Mapping[str, Any]) -> Method:
     """Return the method with a name and with options as its fields, or a given object itself.
 
@@ -215,8 +227,9 @@ def _chosen_method(method: Method | str, options: Mapping[str, Any]) -> Method:
             object is no method, or options are given beside an object.
     """
     if not isinstance(method, str):
-        allowed = f"{', '.join(METHODS)}, or an object as Proof()"
-        require(isinstance(method, Method), "method", value=repr(method), allowed=allowed)
+        if not isinstance(method, Method):
+            allowed = f"{', '.join(METHODS)}, or an object as Proof()"
+            raise RefusedError("method", repr(method), allowed)
         allowed = "none beside a method that is no name"
         require(not options, "options", value=[*options], allowed=allowed)
         return method

@@ -19,7 +19,6 @@ from alphacut.case.structure import MaterialDamping, Structure, StructureSection
 from alphacut.case.structures import STRUCTURES, with_structures
 from alphacut.case.types import AtFirstUse, require_alone
 from alphacut.frame import METHODS, Limit
-from alphacut.frame.methods.method import require_kinks
 from alphacut.frame.structures.storey import yields
 from alphacut.fuzzy import FuzzyNumber
 
@@ -309,6 +308,8 @@ class Content(CellContent):
                 or computed; a limit does not fit; or [identify] has no frame.
         """
         with by_keys("envelope.{}".format):
+            from alphacut.frame.propagation import require_kinks  # takes time to import
+
             require_kinks(structure.model, METHODS[envelope.method])
             if envelope.integrator is not None:
                 from alphacut.frame.dynamics.nonlinear import make_flow  # takes time to import

@@ -204,7 +204,8 @@ def examine_items(
         factors=wave_factors(eigenvalues, coefficients, d),
     )
     waves = model.waves(eigenvalues[0, row_box], row_node)
-    found = Examination.none(len(column))
+    n_items = len(column)
+    found = Examination(np.zeros(n_items, np.int64), np.zeros(n_items), np.zeros(n_items))
     examine(items, boxes, waves, third, target, found)
     return found
 

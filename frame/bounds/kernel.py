@@ -51,11 +51,6 @@ class Examination(NamedTuple):
     value: Array  # side × output at the midpoint of the sub-box
     bound: Array  # guaranteed upper bound of side × output over the sub-box
 
-    @classmethod
-    def none(cls, count: int) -> Examination:
-        """Return an examination of `count` items that `examine` has not filled in yet."""
-        return cls(np.zeros(count, np.int64), np.zeros(count), np.zeros(count))
-
 
 @compiled
 def separable_bound(g: Array, H: Array, r: Array) -> float:

@@ -10,10 +10,6 @@ from dataclasses import dataclass
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, ClassVar
 
-from alphacut.base.errors import RefusedError
-from alphacut.frame.structures.model import StructureModel
-from alphacut.frame.structures.storey import yields
-
 if TYPE_CHECKING:
     from alphacut.base.progress_bar import Progress
     from alphacut.frame.boxes import Boxes, UnitFlow
@@ -84,15 +80,3 @@ class MethodClasses(Mapping[str, "type[Method]"]):
 
 METHODS = MethodClasses()
 """The methods by the words that a case file has for them."""
-
-
-def require_kinks(model: StructureModel, method: Method | type[Method]) -> None:
-    """Refuse a method that needs derivatives of the response where columns of a model yield.
-
-    Raises:
-        RefusedError: The response has kinks as a function of the parameters.
-    """
-    if yields(model) and not method.takes_kinks:
-        names = [name for name, known in METHODS.items() if known.takes_kinks]
-        allowed = f"{', '.join(names)} where columns yield"
-        raise RefusedError("method", method.name, allowed)

@@ -444,7 +444,7 @@ def code_of_box(*, slope, bend, third, radius, target, is_at_ends):
     `third` in size.
     """
     table = np.array([0.0, slope, bend]).reshape(1, 1, 1, 3)
-    found = Examination.none(1)
+    found = Examination(np.zeros(1, np.int64), np.zeros(1), np.zeros(1))
     examine(
         Items(np.array([0, 1]), np.array([0, 1]), node=np.array([0]), column=np.array([1])),
         BoxTables(np.full((1, 1), radius), np.full((1, 2, 1), is_at_ends), table),
