@@ -306,7 +306,8 @@ def proved_error(model: ModalModel) -> Array:
         model: Modal model of a structure that is known to lose energy everywhere in the box.
 
     Returns:
-        Bounds at T time nodes for m outputs, shape (T, m).
+        Bounds at T time nodes for m outputs, shape (T, m); infinite where modes may grow so fast
+        that their waves overflow.
 
     Raises:
         UnprovedError: The box is so wide that M or K may lose its definiteness.
@@ -318,20 +319,22 @@ def proved_error(model: ModalModel) -> Array:
     energy_rates = _energy_rates(structure, modes, norms)
     start_errors = _start_errors(structure, modes, norms)
     coefficients = modes.outputs(structure)
+    growth = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names)))
     deviation = np.zeros(len(model.flow.time))
     output_error = np.zeros((len(model.flow.time), len(model.flow.outputs)))
-    growth = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names)))
-    for s, part in enumerate(response_parts(model, growth)):
-        if isinstance(part.load, Direct):
-            assert structure.feeds is not None
-            feedthrough = structure.feeds[:, s - len(start_errors)]
-            error = (feedthrough - part.coefficient.real[0] * 2.0).magnitude()
-            output_error += part.waves[0][:, :1] * error
-            continue
-        deviation += part.impulse * start_errors[s] + 2 * part.elapsed @ energy_rates[s]
-        coefficient_error = (coefficients[s] - part.coefficient).magnitude()
-        output_error += 2 * part.waves[0] @ coefficient_error
-    return deviation[:, np.newaxis] * norms.outputs + output_error
+    with np.errstate(over="ignore", invalid="ignore"):  # of waves that grow without end
+        for s, part in enumerate(response_parts(model, growth)):
+            if isinstance(part.load, Direct):
+                assert structure.feeds is not None
+                feedthrough = structure.feeds[:, s - len(start_errors)]
+                error = (feedthrough - part.coefficient.real[0] * 2.0).magnitude()
+                output_error += part.waves[0][:, :1] * error
+                continue
+            deviation += part.impulse * start_errors[s] + 2 * part.elapsed @ energy_rates[s]
+            coefficient_error = (coefficients[s] - part.coefficient).magnitude()
+            output_error += 2 * part.waves[0] @ coefficient_error
+        error = deviation[:, np.newaxis] * norms.outputs + output_error
+    return np.where(np.isfinite(error), error, np.inf)
 
 
 def error_between_nodes(model: ModalModel, error: Array) -> Array:

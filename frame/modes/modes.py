@@ -316,7 +316,8 @@ def fitted_model(
         halvings = max(1.0, np.ceil(log2_excess / (max_degree + 1)))
         if best is None or excess < best.excess:
             best = FittedModel(model, error, excess, halvings)
-        if excess <= 1 or degree == max_degree or decay >= 1:
+        # Of an error without bound no degree is known that would give it one.
+        if excess <= 1 or degree == max_degree or decay >= 1 or excess == np.inf:
             return best
         last_degree = degree + np.log(excess / max_excess) / -np.log(decay)
         if step and not last_degree < max_degree + 1:

@@ -55,6 +55,7 @@ from alphacut.frame.modes.modal_model import (
     proved_error,
     response_parts,
 )
+from alphacut.frame.modes.modes import fitted_model
 from alphacut.fuzzy import Interval, Triangular
 from tests.frame import test_forces
 from tests.frame.methods import test_methods
@@ -172,6 +173,17 @@ def test_a_model_that_is_wrong_is_proved_to_be_no_better(kind) -> None:
     deviation = np.abs(bad.values(unit) - truth).max(0)
     assert (deviation > 1e-5 + 10 * proved_error(good)).any()
     assert (deviation <= proved_error(bad) + 1e-12 * (1 + np.abs(truth).max())).all()
+
+
+@pytest.mark.filterwarnings("error")
+def test_modes_that_may_grow_without_end_have_an_infinite_error():
+    """Over such a time the waves of a wide box overflow; an infinite one times 0 is no number."""
+    inputs = {"E": Interval(15e9, 35e9), "m2": Interval(8e3, 22e3)}
+    found = modal_model(FRAME, inputs, 3, duration=1e5, step=1e3)
+    proved = proved_error(found)
+    assert np.isinf(proved[-1]).all()
+    assert (proved[0] < np.inf).all()
+    assert fitted_model(found.flow, found.boxes, np.ones(3), {}).excess == np.inf
 
 
 def test_what_is_not_known_is_not_proved() -> None:
