@@ -23,8 +23,7 @@ from alphacut.base.units import mentions
 from alphacut.rve.cell.lattice import SQUARE, Lattice
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import grid_of
-from alphacut.rve.mesh.gmsh_arrays import SURFACE
-from alphacut.rve.mesh.msh import MshFile, read_msh
+from alphacut.rve.mesh.msh import SURFACE, MshFile, read_msh
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError, unknowns
 from alphacut.rve.mesh.plane import PlaneMesh
 from alphacut.rve.mesh.prism_grid import Elements, PrismGrid, Prisms

@@ -7,11 +7,6 @@ from array import array
 from pathlib import Path
 from typing import Any, cast
 
-VOLUME = 3
-"""Dimension of the entities that hold prisms."""
-SURFACE = 2
-"""Dimension of the entities that hold plane triangles."""
-
 
 def arrays_of_gmsh(path: Path) -> dict[str, array[Any]]:
     """Return what Gmsh reads from a mesh, in flat arrays.
@@ -38,7 +33,7 @@ def arrays_of_gmsh(path: Path) -> dict[str, array[Any]]:
         if text.startswith("Error"):
             raise RuntimeError(text)
     tags, points, _ = gmsh.model.mesh.getNodes()
-    dimension = VOLUME if gmsh.model.getEntities(VOLUME) else SURFACE
+    dimension = 3 if gmsh.model.getEntities(3) else 2  # of volumes, or of surfaces
     entities = [tag for _, tag in gmsh.model.getEntities(dimension)]
     arrays: dict[str, array[Any]] = {}
     for entity in entities:

@@ -19,6 +19,9 @@ from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError
 from alphacut.base.extras import extra_named
 
+SURFACE = 2
+"""Dimension of the entities that hold plane triangles."""
+
 
 @dataclass
 class MshFile:
