@@ -14,11 +14,21 @@ from alphacut.fuzzy import RefusedError
 
 READERS = """
 import os, signal, time
-import numpy as np
 
 def arrays(path, factor):
+    import numpy as np
     assert not [name for name in os.environ if name.startswith("OMPI_")]
     return {"numbers": factor * np.arange(3.0), "texts": np.array([path.name])}
+
+def whole_numbers(path):
+    import sys
+    from array import array
+    assert "numpy" not in sys.modules
+    return {"numbers": array("q", [1, -2]), "none": array("d")}
+
+def refuses(path):
+    from alphacut.base.errors import RefusedError
+    raise RefusedError("count", "three", "two", "take one away")
 
 def raises(path):
     raise ValueError("no such section\\nat all")
@@ -27,6 +37,7 @@ def crashes(path):
     os.kill(os.getpid(), signal.SIGSEGV)
 
 def exhausts(path):
+    import numpy as np
     return {"zeros": np.ones((1 << 33,), np.int8)}
 
 def hangs(path):
@@ -56,6 +67,19 @@ def test_arrays_and_texts_come_back_from_a_process_without_variables_of_mpi(read
     found = read("arrays", factor=0.1)
     assert np.array_equal(found["numbers"], 0.1 * np.arange(3.0))
     assert found["texts"].tolist() == ["a file"]
+
+
+def test_arrays_of_python_come_back_from_a_process_without_numpy(read):
+    found = read("whole_numbers")
+    assert found["numbers"].tolist() == [1, -2]
+    assert len(found["none"]) == 0
+
+
+def test_a_refusal_comes_back_with_its_parts(read):
+    with pytest.raises(RefusedError) as caught:
+        read("refuses")
+    refused = caught.value
+    assert (refused.value, refused.allowed, refused.cure) == ("three", "two", "take one away")
 
 
 @pytest.mark.parametrize(
