@@ -45,15 +45,15 @@ def free_memory() -> float:
 def require_free_memory(name: str, needed: float, what: str) -> None:
     """Raise RefusedError if reading a file would take more memory than is free.
 
-    Nothing is checked where the free memory is unknown.
+    Nothing is checked where the free memory is unknown, or less than a megabyte is needed.
 
     Args:
         name: Name of the file.
         needed: Number of bytes that reading it takes.
         what: What the file promises, such as "an array of 3 × 4".
     """
-    free = free_memory()
-    if needed > free:
+    # A megabyte is not worth the question, which takes as long as reading a short file.
+    if needed > 1e6 and needed > (free := free_memory()):
         value = f"{what}, which takes {needed / 1e9:.3g} GB"
         raise RefusedError(name, value, f"what fits {free / 1e9:.3g} GB of free memory")
 

@@ -62,7 +62,7 @@ class _Channel:
 
 def is_cosmos(file: TextFile) -> bool:
     """Return whether the first line is CSMIP's, or a line announces samples as COSMOS has it."""
-    return bool(TITLE.match(file.lines[0])) or any(DATA.match(line) for line in file.lines)
+    return bool(TITLE.match(file.lines[0])) or any(map(DATA.match, file.lines))
 
 
 def read_cosmos(file: TextFile, channel: str = "", unit: str = "") -> Recording:

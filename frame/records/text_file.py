@@ -62,7 +62,7 @@ class TextFile:
         # A text has no zero bytes, but in UTF-16; archives and workbooks have.
         cure = "export its record as text in UTF-8; unpack an archive, save a sheet as CSV"
         require(b"\0" not in content, name, "no text", "a text file with a record", cure)
-        lines = re.split(r"\r\n|\r|\n", decoded(content))
+        lines = decoded(content).replace("\r\n", "\n").replace("\r", "\n").split("\n")
         first = next((k for k, line in enumerate(lines) if line.strip()), 0)
         # A spreadsheet may put separators of empty cells behind the quotes.
         lines = lines[first:]
@@ -70,8 +70,9 @@ class TextFile:
             lines = [re.sub(r'^"([^"]*)"[,;\s]*$', r"\1", line) for line in lines]
         file = cls(name, tuple(lines), skipped=first)
         # Searches in a line take the square of its length; formats have about 80 letters a line.
-        length, longest = max((len(line), number) for number, line in enumerate(file.lines))
+        length = max(map(len, file.lines))
         if length > 10_000:
+            longest = list(map(len, file.lines)).index(length)
             raise file.refusal(longest, f"{length:,} letters long", "lines of up to 10,000 letters")
         return file
 

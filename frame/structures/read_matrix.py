@@ -161,7 +161,8 @@ def _texts_in(path: Path, member: str) -> Iterator[tuple[str, str]]:
         rb"(?m)(?:^[ \t]*(?:%(?!%MatrixM)|\$|\*\*|//)|#|PARAM\W+WTMASS).*$", content
     ):
         row = content.count(b"\n", 0, comment.start()) + 1
-        yield decoded(comment[0]).lstrip(" \t%#$*/"), f"line {row}"
+        if text := decoded(comment[0]).lstrip(" \t\r%#$*/"):
+            yield text, f"line {row}"
 
 
 def _stated_factor(path: Path, member: str, quantity: str) -> float:

@@ -37,7 +37,7 @@ def test_a_head_that_promises_more_pixels_than_its_file_holds_is_refused(tmp_pat
 
 
 def test_a_picture_that_does_not_fit_the_free_memory_is_refused(tmp_path, monkeypatch):
-    Image.fromarray(np.zeros((40, 50), np.uint8)).save(tmp_path / "a.png")
+    Image.fromarray(np.zeros((400, 500), np.uint8)).save(tmp_path / "a.png")
     monkeypatch.setattr(memory, "free_memory", lambda: 3e4)
     with refuses("a.png"):
         read_image(tmp_path / "a.png", spacing=1.0)

@@ -201,8 +201,8 @@ def test_a_matrix_larger_than_the_unknowns_is_refused(tmp_path):
 
 
 def test_an_archive_that_unpacks_to_more_than_memory_is_refused(tmp_path, monkeypatch):
-    np.savez_compressed(tmp_path / "k.npz", k=np.zeros((200, 200)))
-    assert read_matrix(tmp_path / "k.npz").shape == (200, 200)
+    np.savez_compressed(tmp_path / "k.npz", k=np.zeros((300, 300)))
+    assert read_matrix(tmp_path / "k.npz").shape == (300, 300)
     monkeypatch.setattr(memory, "free_memory", lambda: 1e5)
     with refuses("k.npz:k"):
         read_matrix(tmp_path / "k.npz")
