@@ -184,7 +184,9 @@ def test_few_data_leave_the_slopes_as_fuzzy_as_their_bootstrap_band(rng, monkeyp
         sample = AreaWeighted.from_values(values, groups=np.arange(60) % 6)
         pbox = fit_map(RadiusLimits(DISCS, (0.15, 0.85)), sample, seed=seed).pbox
         count += pbox.a2[0] <= truth.a2 <= pbox.a2[2] and pbox.a4[0] <= truth.a4 <= pbox.a4[2]
-    assert count >= 8  # the band's confidence is 99 %
+    # The band's confidence is 99 % with many groups. Of 1,000 samples with six groups 3 % are
+    # missed, hence six of ten in one of 7 million draws.
+    assert count >= 5
 
 
 def test_discs_tighter_than_their_cells_count_as_touching_them():

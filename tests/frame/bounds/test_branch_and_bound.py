@@ -148,6 +148,29 @@ def test_modes_that_are_left_out_count_as_an_error_of_the_start() -> None:
     assert (missed <= proved_error(few)).all()
 
 
+def test_modes_are_left_out_while_the_proof_counts_them_within_the_tolerance(rng) -> None:
+    """Of a stiff storey too, whose mode answers a record far less than its energy may."""
+    stiffness = 10.0 ** rng.uniform(7, 9, 5)
+    stiffness[rng.integers(5)] *= 1e3
+    stiff = StoreyFrame(
+        10.0 ** rng.uniform(4, 6, 5),
+        stiffness=stiffness,
+        damping_ratio=float(rng.uniform(0.01, 0.1)),
+        ground=Accelerogram(0.05, rng.normal(size=60)),
+        outputs=("q5", "a5"),
+    )
+    flow = LinearFlow(stiff, ("k1",), 2.0, 0.05, Exact())
+    cuts = boxes({"k1": Interval(*(stiffness[0] * np.array([1 - 1e-5, 1 + 1e-5])))}, (0,))
+    with_all = proved_error(ModalModel.of_degree(flow, cuts, 3)).max(axis=0)
+    counts = set[int]()
+    for fraction in (0.0, *np.geomspace(1e-7, 1e3, 21), 1e9):
+        tolerance = fraction * UnitFlow(flow, cuts).peak
+        model = ModalModel.of_degree(flow, cuts, 3, tolerance)
+        assert (proved_error(model).max(axis=0) <= with_all + 1.001 * tolerance).all()
+        counts.add(model.count)
+    assert {1, 5} <= counts
+
+
 def wrong(polynomials: TaylorModel) -> TaylorModel:
     """The same with their constants and their slopes a thousandth too large."""
     first, second, *others = polynomials.parts
