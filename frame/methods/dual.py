@@ -238,7 +238,8 @@ class DualProof(Method):
             pruned_upper = upper.copy()
             jobs = []
             for (o, s), problem in problems.items():
-                above = problem.open_nodes(1.0)
+                # What the models reach may lie above all that is attained.
+                above = np.flatnonzero(problem.upper > problem.attained + problem.wanted_gap)
                 if len(above):
                     job = pool.submit(prune_ends, level, problem, above)
                     jobs.append((o, s, nodes[above], job))
