@@ -99,7 +99,7 @@ _VOCABULARY = """
 _SIGNS = str.maketrans("−∕⁄⋅", "-//·")
 # Signs of Chinese, Japanese and Korean, which stand beside a unit without a blank, and letters of
 # other scripts. A set without its complement takes Python's `re` four times as long to compile.
-_WIDE = r"[^\x00-\u303f]"
+_WIDE = r"[^\x00-\u303f\U00010000-\U0010ffff]"
 _LETTER = rf"(?!{_WIDE})[^\W\d_]"
 # Units that are words or other symbols as well: they count where brackets, a number or a word such
 # as "unit" stand beside them.
