@@ -487,7 +487,7 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
     cells = Cells(
         ends=np.zeros((max_cells, *data.cell.shape), np.int64),
         mu=np.zeros((max_cells, 0)),  # multipliers are kept by node
-        disagreement=np.zeros((max_cells, len(data.linear))),
+        disagreement=np.zeros((max_cells, len(data.linear))),  # here the variation of responses
         value=np.zeros(max_cells),  # lower bounds of the peak over the cells
     )
     cells.ends[0] = data.cell

@@ -207,7 +207,8 @@ def halve_cell(cells: Cells, halved: int, count: int) -> bool:
     Args:
         cells: Cells with `ends`, first and last point along ω, then q, of each of K modes, shape
             (cells, K, 4), and `disagreement` of the variables, mode by mode ω, g, participation
-            factors, shape (cells, Z).
+            factors, shape (cells, Z). Other numbers in its place halve a cell where they are
+            largest.
         halved: Index of the cell.
         count: Number of cells so far, which is the index of the new one; it must be below the
             length of the arrays.
